@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,9 +16,11 @@ from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
     from sarl_core.library import Item, Library
+    from sarl_core.library.items import Kind
 
 _PREFIX = "library:"
 _RULES, _BUNDLE = ".json", ".sarl"
+_LISTED = 20  # rows or lines of a result
 
 library = typer.Typer(
     name="library",
@@ -28,6 +31,10 @@ library = typer.Typer(
     "`SARL_LIBRARY` says: a folder, or the address of a PostgreSQL database.",
 )
 
+_Name = Annotated[
+    str | None,
+    typer.Option("--name", show_default=False, help="What to call it; the name of the file."),
+]
 _Identifier = Annotated[str, typer.Argument(metavar="ID", show_default=False, help="As listed.")]
 
 
@@ -87,17 +94,14 @@ def list_items(
 
     Example: `python -m sarl_core library list --kind rules`
     """
-    from sarl_core.library.items import KINDS
-
-    if kind is not None and kind not in KINDS:
-        raise InputError(f"--kind {kind} is no kind of thing; choose from {', '.join(KINDS)}")
+    wanted = None if kind is None else _checked_kind(kind)
     opened = _opened()
-    items = opened.items(kind=kind, removed=removed)
+    items = opened.items(kind=wanted, removed=removed)
     if as_json:
         terminal.print_json({"items": [item.document for item in items]})
         return
     if not items:
-        terminal.print_lines([f"Nothing is kept in {opened.place.said}; `library import` does."])
+        terminal.print_lines([f"Nothing is kept in {opened.place.said}; `library add` does."])
         return
     terminal.print_table(
         ("id", "kind", "name", "author", "kept", "approved by"),
@@ -107,7 +111,7 @@ def list_items(
                 item.kind,
                 item.name,
                 item.author,
-                item.created.astimezone().strftime("%Y-%m-%d %H:%M"),
+                _time_text(item.created),
                 ", ".join(one.author for one in item.approvals),
             )
             for item in items
@@ -124,16 +128,38 @@ def show_item(identifier: _Identifier, as_json: Json = False) -> None:
 
     Example: `python -m sarl_core library show ID`
     """
+    from sarl_core.library.results import note_text, notes_about
+
     opened = _opened()
     item = opened.item(identifier)
     versions = opened.versions(item.id)
+    notes = [(one, note_text(opened, one)) for one in notes_about(opened, item)]
     if as_json:
         paths = {one.role: str(opened.path(item, one.role)) for one in item.files}
         terminal.print_json(
-            {**item.document, "paths": paths, "versions": [one.id for one in versions]}
+            {
+                **item.document,
+                "paths": paths,
+                "versions": [one.id for one in versions],
+                "notes": [
+                    {
+                        "id": one.id,
+                        "author": one.author,
+                        "created": one.created.isoformat(),
+                        "text": text,
+                    }
+                    for one, text in notes
+                ],
+            }
         )
         return
     terminal.print_facts(_facts(opened, item, versions))
+    if item.kind == "note":
+        terminal.print_lines(["", note_text(opened, item)])
+    if item.kind == "result":
+        _print_result(opened, item)
+    for one, text in notes:
+        terminal.print_lines(["", f"{one.author}, {_time_text(one.created)}:", text])
 
 
 @library.command("export")
@@ -164,10 +190,7 @@ def import_file(
             help="What `library export` wrote, demonstrations, or a rule file.",
         ),
     ],
-    name: Annotated[
-        str | None,
-        typer.Option("--name", show_default=False, help="What to call it; the name of the file."),
-    ] = None,
+    name: _Name = None,
     as_json: Json = False,
 ) -> None:
     """Keep what was exported, demonstrations, or a rule file.
@@ -175,33 +198,67 @@ def import_file(
     Example: `python -m sarl_core library import data/rules/cartpole_compact.json`
     """
     from sarl_core.library.bundles import import_bundle
-    from sarl_core.library.contents import add_demonstrations, add_rules, sources_of
 
-    opened, author = _opened(), _author()
+    opened = _opened()
     if file.suffix.lower() == _BUNDLE:
         if name is not None:
             raise InputError("what was exported has names; leave --name out")
-        items = import_bundle(opened, file, author=author)
+        items = import_bundle(opened, file, author=_author())
     elif file.suffix.lower() == _RULES:
-        from sarl_core.mining.rule_set import RuleSet
-
-        rules = RuleSet.load(file)
-        items = [
-            add_rules(
-                opened,
-                rules,
-                name or file.stem,
-                author=author,
-                came_from=sources_of(opened, rules),
-            )
-        ]
+        items = [_add_rules(opened, file, name, ())]
     else:
-        from sarl_core.demonstrations.formats import load_demonstrations
-
-        items = [
-            add_demonstrations(opened, load_demonstrations(file), name or file.stem, author=author)
-        ]
+        items = [_add_demonstrations(opened, file, name, ())]
     _tell(items, "is kept", as_json)
+
+
+@library.command("add")
+def add_file(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            show_default=False,
+            help="A result (.csv, .json, .html, .gif, .mp4, .png), a note (.txt, .md), "
+            "demonstrations, or a rule file.",
+        ),
+    ],
+    kind: Annotated[
+        str,
+        typer.Option(
+            "--kind", show_default=False, help="What it is: result, note, rules or demonstrations."
+        ),
+    ],
+    name: _Name = None,
+    about: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--about",
+            metavar="ID",
+            show_default=False,
+            help="What it is about, or was made of. May be given several times.",
+        ),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Keep a file, and what it is about: a result of work, a note, rules, demonstrations.
+
+    Example: `python -m sarl_core library add audit.json --kind result --about ID`
+    """
+    from sarl_core.library.results import add_note, add_result, note_of_file, standing_ids
+
+    opened, author = _opened(), _author()
+    kind = _checked_kind(kind)
+    came_from = standing_ids(opened, about or ())
+    if kind == "result":
+        item = add_result(opened, file, name or "", author=author, about=came_from)
+    elif kind == "note":
+        text, ending = note_of_file(file), file.suffix.lower()
+        item = add_note(opened, text, name or "", author=author, about=came_from, ending=ending)
+    elif kind == "rules":
+        item = _add_rules(opened, file, name, came_from)
+    else:
+        item = _add_demonstrations(opened, file, name, came_from)
+    _tell([item], "is kept", as_json)
 
 
 @library.command("remove")
@@ -237,6 +294,54 @@ def approve_item(
     _tell([_opened().approve(identifier, author=author, note=note)], "is approved", as_json)
 
 
+def _print_result(opened: Library, item: Item) -> None:
+    """The beginning of a table or a document; of a picture or a page its path says enough."""
+    from sarl_core.library.results import result_view
+
+    view = result_view(opened.path(item), _LISTED)
+    if view.rows:
+        terminal.print_table(view.rows[0], view.rows[1:])
+    if view.lines:
+        terminal.print_lines(["", *view.lines])
+    if view.more:
+        terminal.print_lines(["and more; the file holds all of it"])
+
+
+def _add_rules(opened: Library, file: Path, name: str | None, about: Sequence[str]) -> Item:
+    """Keep a rule file, of the demonstrations that are named or that it says it was mined from."""
+    from sarl_core.library.contents import add_rules, sources_of
+    from sarl_core.mining.rule_set import RuleSet
+
+    rules = RuleSet.load(file)
+    came_from = about or sources_of(opened, rules)
+    return add_rules(opened, rules, name or file.stem, author=_author(), came_from=came_from)
+
+
+def _add_demonstrations(
+    opened: Library, file: Path, name: str | None, about: Sequence[str]
+) -> Item:
+    from sarl_core.demonstrations.formats import load_demonstrations
+    from sarl_core.library.contents import add_demonstrations
+
+    demonstrations = load_demonstrations(file)
+    return add_demonstrations(
+        opened, demonstrations, name or file.stem, author=_author(), came_from=about
+    )
+
+
+def _checked_kind(text: str) -> Kind:
+    from sarl_core.library.items import KINDS
+
+    for kind in KINDS:
+        if text == kind:
+            return kind
+    raise InputError(f"--kind {text} is no kind of thing; choose from {', '.join(KINDS)}")
+
+
+def _time_text(time: datetime) -> str:
+    return time.astimezone().strftime("%Y-%m-%d %H:%M")
+
+
 def _opened() -> Library:
     from sarl_core.library import Library
 
@@ -264,8 +369,8 @@ def _facts(opened: Library, item: Item, versions: Sequence[Item]) -> list[tuple[
         ("kept", item.created.astimezone().strftime("%Y-%m-%d %H:%M:%S")),
         ("digest", item.digest),
         ("command", item.command),
-        *((str(key), str(value)) for key, value in item.details.items()),
-        *(("made of", f"{opened.item(one).name}, {one}") for one in item.came_from),
+        *((key.replace("_", " "), _detail_text(value)) for key, value in item.details.items()),
+        *((_OF[item.kind], _source_text(opened, one)) for one in item.came_from),
         *(
             ("approved by", f"{one.author}{f': {one.note}' if one.note else ''}")
             for one in item.approvals
@@ -277,3 +382,22 @@ def _facts(opened: Library, item: Item, versions: Sequence[Item]) -> list[tuple[
     others = [one for one in versions if one.id != item.id]
     facts += [("other version", f"{one.id}, {one.created:%Y-%m-%d %H:%M}") for one in others]
     return [(name, value) for name, value in facts if value]
+
+
+def _detail_text(value: object) -> str:
+    if isinstance(value, Mapping):
+        return "; ".join(f"{key}: {_detail_text(one)}" for key, one in value.items())
+    if isinstance(value, list):
+        return ", ".join(map(_detail_text, value))
+    return "" if value is None else str(value)
+
+
+_OF = {"demonstrations": "made of", "rules": "made of", "result": "about", "note": "about"}
+
+
+def _source_text(opened: Library, identifier: str) -> str:
+    """What a thing came from, which may be removed for good or have stayed elsewhere."""
+    try:
+        return f"{opened.item(identifier).name}, {identifier}"
+    except InputError:
+        return f"{identifier}, which is not here"

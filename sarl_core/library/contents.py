@@ -36,6 +36,7 @@ def add_demonstrations(
     name: str,
     *,
     author: str,
+    came_from: Sequence[str] = (),
     command: str = "",
 ) -> Item:
     """Keep demonstrations, with names, units and formulas.
@@ -45,6 +46,7 @@ def add_demonstrations(
         demonstrations: All of them.
         name: What they are called.
         author: Whose they are.
+        came_from: Ids of what they were made of.
         command: That makes them again.
 
     Raises:
@@ -65,6 +67,7 @@ def add_demonstrations(
             {"demonstrations": (path, ".parquet")},
             author=author,
             digest=demonstrations.digest,
+            came_from=came_from,
             command=command,
             details=about,
         )

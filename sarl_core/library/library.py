@@ -295,6 +295,21 @@ class Library:
         wanted = [at.digest == digest, at.removed.is_(None)]
         return self._select(*wanted, *([] if kind is None else [at.kind == kind]))
 
+    def made_of(self, identifier: str, *, kind: Kind | None = None) -> list[Item]:
+        """All things that say they were made of one, or are about it, the newest first.
+
+        Args:
+            identifier: Of the one.
+            kind: Of this kind only.
+
+        Raises:
+            InputError: If it is no id.
+            WorkError: If the library cannot be read.
+        """
+        at = tables.items.c
+        wanted = [at.came_from.contains(f'"{as_id(identifier)}"'), at.removed.is_(None)]
+        return self._select(*wanted, *([] if kind is None else [at.kind == kind]))
+
     def path(self, item: Item, role: str | None = None) -> Path:
         """Where a file of a thing lies; it must not be changed.
 

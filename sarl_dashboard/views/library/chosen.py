@@ -17,7 +17,9 @@ from sarl_dashboard.components.downloads import download
 from sarl_dashboard.state.data import choose_dataset
 from sarl_dashboard.state.url import set_url_choice
 from sarl_dashboard.text import escaped, file_name
+from sarl_dashboard.views.library.contents import show_content
 from sarl_dashboard.views.library.listing import KINDS, about, size_text
+from sarl_dashboard.views.library.notes import show_notes, show_results, show_sources
 
 
 def show_chosen(opened: Library, item: Item, author: str) -> None:
@@ -38,8 +40,9 @@ def show_chosen(opened: Library, item: Item, author: str) -> None:
         return
     with st.container(border=True):
         st.subheader(escaped(item.name))
+        facts = [KINDS[item.kind], about(item), size_text(item.size) if item.files else ""]
         st.caption(
-            f"{KINDS[item.kind]} · {about(item) or 'no more is known'} · {size_text(item.size)} · "
+            f"{' · '.join(filter(None, facts))} · "
             f"kept by {escaped('you' if own else item.author)} on "
             f"{item.created.astimezone():%d %B %Y, %H:%M}"
         )
@@ -48,10 +51,14 @@ def show_chosen(opened: Library, item: Item, author: str) -> None:
         for approval in item.approvals:
             note = f": {escaped(approval.note)}" if approval.note else ""
             st.markdown(f":material/verified: Approved by **{escaped(approval.author)}**{note}")
+        show_content(opened, item)
+        show_sources(opened, item)
         _buttons(opened, item, author, own=own)
         st.caption(f"On the command line: `library:{item.id}`")
         if item.kind == "rules":
             _rules(opened, item, author)
+        show_results(opened, item, author)
+        show_notes(opened, item, author)
 
 
 def _buttons(opened: Library, item: Item, author: str, *, own: bool) -> None:

@@ -26,6 +26,14 @@ KINDS = {
     "result": "Result",
     "note": "Note",
 }
+_FORMS = {
+    ".csv": "a table",
+    ".gif": "a film",
+    ".html": "a page",
+    ".json": "an answer",
+    ".mp4": "a film",
+    ".png": "a picture",
+}
 
 
 def choose_item(opened: Library, author: str) -> Item | None:
@@ -36,7 +44,8 @@ def choose_item(opened: Library, author: str) -> Item | None:
     if not items:
         st.info(
             "Nothing is kept yet. Upload demonstrations on the page Demonstrations: they are kept "
-            "at once. What somebody exported can be brought here below.",
+            "at once. What somebody exported can be brought here below; on the command line, "
+            "`sarl library add` keeps results and notes.",
             icon=":material/inventory_2:",
         )
         return item
@@ -98,6 +107,8 @@ def about(item: Item) -> str:
         number = details.get(key)
         if isinstance(number, int):
             parts.append(counted(number, noun))
+    if item.kind == "result" and item.files:
+        parts.append(_FORMS.get(item.files[0].ending, item.files[0].ending))
     return ", ".join(parts)
 
 
