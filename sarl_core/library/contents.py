@@ -277,7 +277,7 @@ def sign_off_at_hand(rule_set: RuleSet) -> SignOff | None:
             return SignOff()
         with Library(place) as library:
             return rules_sign_off(library, rule_set)
-    except SarlError:  # what was asked for can be done without it
+    except (SarlError, OSError):  # what was asked for can be done without it
         return None
 
 

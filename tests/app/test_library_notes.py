@@ -13,6 +13,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core.library import Item, Library
 from sarl_core.library.results import add_note, add_result, note_text, notes_about
 from sarl_dashboard.state import library as state
+from sarl_dashboard.views.library import contents
 from tests.app.screens import errors, html, open_page, texts
 
 SCRIPT = "<script>alert(1)</script> *not* `so`"
@@ -89,6 +90,18 @@ def test_a_picture_is_shown_and_a_damaged_one_is_not(tmp_path: Path) -> None:
     assert not app.get("image")
     assert "cannot be shown" in texts(app)
     assert "Download .gif" in downloads(app)
+
+
+def test_a_film_that_is_too_large_is_carried_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    film = b"\x00\x00\x00\x20ftypisom"
+    assert result_page(tmp_path, "a.mp4", film).get("video")
+    monkeypatch.setattr(contents, "_LARGEST", 10)
+    app = result_page(tmp_path, "a.mp4", film)
+    assert not app.get("video")
+    assert "too large to be shown" in texts(app)
+    assert "Download .mp4" in downloads(app)
 
 
 def test_a_result_leads_to_what_it_is_about_and_back(tmp_path: Path, rules: Item) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from sarl_core import RuleSet
 from sarl_core.explaining.words.sign_off import SignOff
-from sarl_core.library import Library
+from sarl_core.library import Library, contents
 from sarl_core.library.contents import add_rules, rules_sign_off, sign_off_at_hand
 from sarl_core.library.database import is_there
 from sarl_core.library.place import LibraryPlace
@@ -104,4 +104,14 @@ def test_what_is_no_library_says_nothing(
 ) -> None:
     monkeypatch.setenv("SARL_LIBRARY", str(tmp_path))
     (tmp_path / "library.sqlite3").write_bytes(b"something else" * 100)
+    assert sign_off_at_hand(rules) is None
+
+
+def test_a_folder_that_may_not_be_looked_into_says_nothing(
+    rules: RuleSet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def forbidden(_: LibraryPlace) -> bool:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(contents, "is_there", forbidden)
     assert sign_off_at_hand(rules) is None

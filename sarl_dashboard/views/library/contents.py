@@ -17,6 +17,7 @@ from sarl_dashboard.text import file_name, refuse
 
 _ROWS = 500  # of a table, or lines of a document
 _HIGHEST = 460  # pixels
+_LARGEST = 100 * 2**20  # bytes of a picture or a film that goes to a browser
 
 
 def show_content(opened: Library, item: Item) -> None:
@@ -39,7 +40,9 @@ def show_content(opened: Library, item: Item) -> None:
 
 def _show_result(opened: Library, item: Item) -> None:
     path = opened.path(item)
-    if path.suffix in (".gif", ".png"):
+    if path.suffix in (".gif", ".png", ".mp4") and item.size > _LARGEST:
+        st.caption("It is too large to be shown here; its file is below.")
+    elif path.suffix in (".gif", ".png"):
         _picture(path.read_bytes())
     elif path.suffix == ".mp4":
         st.video(path.read_bytes())
