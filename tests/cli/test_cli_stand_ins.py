@@ -7,7 +7,6 @@ import re
 import shlex
 import tempfile
 from html import unescape
-from pathlib import Path
 
 import pytest
 
@@ -52,7 +51,10 @@ def named(run):
     return data
 
 
-def test_names_and_formulas_reach_commands(run, named, tmp_path, place):
+def test_names_and_formulas_reach_commands(run, named, tmp_path, place, monkeypatch):
+    aside = tmp_path / "aside"
+    aside.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(aside))
     checked = json.loads(run("check", named, "--json"))
     assert [one["name"] for one in checked["features"]] == [
         "place",
@@ -81,7 +83,7 @@ def test_names_and_formulas_reach_commands(run, named, tmp_path, place):
     (item,) = json.loads(run("library", "import", out, "--json"))["items"]
     assert item["came_from"] == [named.removeprefix("library:")]
     # Nothing is left of the file that was made for it.
-    assert not list(Path(tempfile.gettempdir()).rglob(f"{named.removeprefix('library:')}*"))
+    assert not list(aside.iterdir())
     assert len(list((place / "files").glob("*/*"))) == 2
 
 
