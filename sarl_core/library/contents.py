@@ -243,12 +243,12 @@ def rules_of(library: Library, item: Item) -> RuleSet:
     return RuleSet.load(file_of(library, item, "rules"))
 
 
-def rules_sign_off(library: Library, rule_set: RuleSet) -> SignOff:
+def rules_sign_off(library: Library, digest: str) -> SignOff:
     """Who approved rules as they stand, whatever file they came in.
 
     Args:
         library: Where that is known.
-        rule_set: With every edit.
+        digest: Of the rules with every edit, as of `rules_digest`.
 
     Returns:
         Of all times that it holds these very rules.
@@ -256,7 +256,7 @@ def rules_sign_off(library: Library, rule_set: RuleSet) -> SignOff:
     Raises:
         WorkError: If it cannot be read.
     """
-    items = library.with_digest(rules_digest(rule_set), kind="rules")
+    items = library.with_digest(digest, kind="rules")
     if not items:
         return SignOff()
     return sign_off_of(approval for item in items for approval in item.approvals)
@@ -276,7 +276,7 @@ def sign_off_at_hand(rule_set: RuleSet) -> SignOff | None:
         if not is_there(place):
             return SignOff()
         with Library(place) as library:
-            return rules_sign_off(library, rule_set)
+            return rules_sign_off(library, rules_digest(rule_set))
     except (SarlError, OSError):  # what was asked for can be done without it
         return None
 

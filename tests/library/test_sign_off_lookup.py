@@ -15,6 +15,7 @@ from sarl_core.library import Library, contents
 from sarl_core.library.contents import add_rules, rules_sign_off, sign_off_at_hand
 from sarl_core.library.database import is_there
 from sarl_core.library.place import LibraryPlace
+from sarl_core.mining.rule_set import rules_digest
 
 RULES = Path(__file__).parents[2] / "data" / "rules"
 
@@ -25,18 +26,20 @@ def rules() -> RuleSet:
 
 
 def test_an_approval_is_of_the_rules_as_they_stand(library: Library, rules: RuleSet) -> None:
-    assert rules_sign_off(library, rules) == SignOff()
+    assert rules_sign_off(library, rules_digest(rules)) == SignOff()
     item = add_rules(library, rules, "two rules", author="Ada")
-    assert rules_sign_off(library, rules) == SignOff(is_known=True)
+    assert rules_sign_off(library, rules_digest(rules)) == SignOff(is_known=True)
     approved = library.approve(item.id, author="Eve", note="seen")
-    assert rules_sign_off(library, rules) == SignOff(approved.approvals, is_known=True)
+    assert rules_sign_off(library, rules_digest(rules)) == SignOff(
+        approved.approvals, is_known=True
+    )
     first, *others = rules.rules
     changed = replace(rules, rules=(replace(first, enabled=False), *others))
-    assert rules_sign_off(library, changed) == SignOff()
+    assert rules_sign_off(library, rules_digest(changed)) == SignOff()
     version = add_rules(library, changed, "one rule", author="Ada", parent=item.id)
-    assert rules_sign_off(library, changed).approvals == version.approvals == ()
+    assert rules_sign_off(library, rules_digest(changed)).approvals == version.approvals == ()
     library.remove(item.id, author="Ada")
-    assert rules_sign_off(library, rules) == SignOff()
+    assert rules_sign_off(library, rules_digest(rules)) == SignOff()
 
 
 def test_rules_that_several_keep_are_approved_once_for_all(
@@ -46,7 +49,9 @@ def test_rules_that_several_keep_are_approved_once_for_all(
         item = add_rules(library, rules, "rules", author=author)
         library.approve(item.id, author="Eve", note=f"of {author}")
     library.approve(item.id, author="Ada")
-    said = [(one.author, one.note) for one in rules_sign_off(library, rules).approvals]
+    said = [
+        (one.author, one.note) for one in rules_sign_off(library, rules_digest(rules)).approvals
+    ]
     assert said == [("Eve", "of Bob"), ("Ada", "")]
 
 
@@ -61,7 +66,7 @@ def test_all_who_approve_at_once_stand(place: LibraryPlace, rules: RuleSet) -> N
 
         with ThreadPoolExecutor(6) as people:
             list(people.map(approve, names))
-        approvals = rules_sign_off(library, rules).approvals
+        approvals = rules_sign_off(library, rules_digest(rules)).approvals
     assert sorted(one.author for one in approvals) == sorted(names)
     assert all(one.note == f"seen by {one.author}" for one in approvals)
 
