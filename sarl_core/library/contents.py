@@ -81,6 +81,7 @@ def add_rules(
     author: str,
     parent: str = "",
     came_from: Sequence[str] = (),
+    edits: Sequence[Edit] = (),
     shared: bool = False,
 ) -> Item:
     """Keep a rule set, as it is written into a rule file.
@@ -92,6 +93,7 @@ def add_rules(
         author: Whose it is.
         parent: Id of the version that it was made from.
         came_from: Ids of the demonstrations that it was mined from.
+        edits: That were made on what was mined; they are part of the rules already.
         shared: Whether it stands in everybody's list.
 
     Raises:
@@ -102,10 +104,14 @@ def add_rules(
         path = Path(folder) / "rules.json"
         rule_set.save(path)
         about = {"rules": len(rule_set), "environment": rule_set.source.env_id}
+        files: dict[str, tuple[Path | bytes, str]] = {"rules": (path, ".json")}
+        if edits:
+            files["edits"] = (edits_to_json(edits).encode(), ".json")
+            about["edits"] = len(edits)
         return library.add(
             "rules",
             name,
-            {"rules": (path, ".json")},
+            files,
             author=author,
             digest=rules_digest(rule_set),
             parent=parent,

@@ -5,18 +5,21 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.errors import SarlError
+from sarl_core.mining.editing.edits import Edit
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
-from sarl_dashboard.state import library
+from sarl_dashboard.state import edits, library, rule_base
+from sarl_dashboard.state import in_force as rules_in_force
 from sarl_dashboard.state.data import raw_demonstrations
 from sarl_dashboard.text import refuse
 
 
-def keep_rules_form(rule_set: RuleSet) -> None:
+def keep_rules_form(rule_set: RuleSet, *, in_force: bool) -> None:
     """A name and a button; once kept, where it is.
 
     Args:
         rule_set: As it stands on the page.
+        in_force: Whether these are the rules in force, whose edits and parent are known.
     """
     raw = raw_demonstrations()
     if raw is None:
@@ -28,7 +31,8 @@ def keep_rules_form(rule_set: RuleSet) -> None:
     if not pressed:
         return
     try:
-        item = library.keep_rules(rule_set, name, raw)
+        made, parent = _history() if in_force else ((), "")
+        item = library.keep_rules(rule_set, name, raw, edits=made, parent=parent)
     except SarlError as error:
         refuse(error)
         return
@@ -38,3 +42,11 @@ def keep_rules_form(rule_set: RuleSet) -> None:
         icon=":material/check:",
         query_params={"item": item.id},
     )
+
+
+def _history() -> tuple[tuple[Edit, ...], str]:
+    """The edits of the rules in force, and the id of the version that they were made on."""
+    base = rule_base.base()
+    made = edits.history(base).edits if rules_in_force.is_edited() else ()
+    name = rule_base.base_name()
+    return made, name if rule_base.is_kept(name) else ""

@@ -293,13 +293,23 @@ def keep_edits(edits: Sequence[Edit], base: str) -> Item:
     return add_edits(library(), edits, base, author=author())
 
 
-def keep_rules(rule_set: RuleSet, name: str, demonstrations: Demonstrations) -> Item:
-    """Keep a rule set as it stands, as a version of the one that was kept before it in this visit.
+def keep_rules(
+    rule_set: RuleSet,
+    name: str,
+    demonstrations: Demonstrations,
+    *,
+    edits: Sequence[Edit] = (),
+    parent: str = "",
+) -> Item:
+    """Keep a rule set as it stands, as a new version.
 
     Args:
         rule_set: With every edit.
         name: What it is called.
         demonstrations: That it is about.
+        edits: That were made on the rules before.
+        parent: Id of the version that it was made from; the one that was kept before it in this
+            visit where not given.
 
     Returns:
         What is kept; where its author keeps the same already, that.
@@ -318,8 +328,9 @@ def keep_rules(rule_set: RuleSet, name: str, demonstrations: Demonstrations) -> 
         rule_set,
         name,
         author=author(),
-        parent=before.get(demonstrations.digest, ""),
+        parent=parent or before.get(demonstrations.digest, ""),
         came_from=[raw] if raw else [],
+        edits=edits,
     )
     before[demonstrations.digest] = item.id
     return item

@@ -15,7 +15,7 @@ from sarl_core.library import Library
 from sarl_core.library.contents import annotated_file, rules_of
 from sarl_core.library.items import new_id
 from sarl_dashboard.state import library as state
-from tests.app.screens import errors, metrics, open_page, texts
+from tests.app.screens import chosen_rules, errors, metrics, open_page, texts
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 ROWS = b"obs_speed,action,episode\n0.5,0,0\n1.5,1,0\n0.25,0,1\n2.5,1,1\n0.1,0,1\n"
@@ -207,3 +207,44 @@ def test_rules_are_kept_as_versions_and_approved_one_by_one() -> None:
     app.button(key=f"version_{second.id}").click().run()
     assert app.query_params["item"] == second.id
     assert "Approved by" not in texts(app)
+
+
+def test_what_is_kept_of_edited_rules_knows_its_edits_and_its_parent_and_is_put_in_force() -> None:
+    app = open_page("edit", data="cartpole")
+    app.button(key="edit_switch").click().run()
+    app.text_input(key="keep_name").set_value("without one").run()
+    app.button(key="keep_rules").click().run()
+    assert not errors(app)
+    with Library() as library:
+        (first,) = library.items("Ada", kind="rules")
+        assert first.details["edits"] == 1
+        assert {one.role for one in first.files} == {"edits", "rules"}
+    page = open_page("library", item=first.id, data="lunar_lander")
+    assert "1 edit" in texts(page)
+    page.button(key="library_in_force").click().run()
+    assert not errors(page)
+    assert chosen_rules(page) == first.id
+    # Edited once more and kept again, it is a version of the first.
+    again = open_page("edit", data="cartpole", set=first.id)
+    again.button(key="edit_pin").click().run()
+    again.text_input(key="keep_name").set_value("with a pin").run()
+    again.button(key="keep_rules").click().run()
+    with Library() as library:
+        second = next(one for one in library.items("Ada", kind="rules") if one.id != first.id)
+        assert (second.parent, second.lineage) == (first.id, first.lineage)
+    page = open_page("library", item=second.id)
+    compared = [link.proto.query_string for link in page.get("page_link")]
+    assert any(first.id in text and second.id in text for text in compared)
+    both = open_page("difference", data="cartpole", sets=f"{first.id}|{second.id}")
+    assert not errors(both)
+    assert len(both.dataframe[0].value) == 2
+
+
+def test_what_is_kept_for_a_link_alone_opens_and_offers_nothing() -> None:
+    app = open_page("edit", data="cartpole")
+    app.button(key="edit_switch").click().run()
+    identifier = app.query_params["edits"]
+    identifier = identifier if isinstance(identifier, str) else identifier[0]
+    page = open_page("library", item=identifier)
+    assert not page.exception
+    assert "Kept for a link" in texts(page)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.errors import SarlError
+from sarl_dashboard.components.keeping import keep_rules_form
 from sarl_dashboard.state import edits, in_force
 from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.text import refuse
@@ -44,3 +45,5 @@ def editing(of: Base) -> None:
         )
     form.form(of, after)
     conflicts(of, after)
+    if edits.history(of).edits and in_force.is_edited():
+        keep_rules_form(after.rule_set, in_force=True)

@@ -8,6 +8,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
 from sarl_dashboard.components.keeping import keep_rules_form
 from sarl_dashboard.components.settings import switch
+from sarl_dashboard.state import in_force
 from sarl_dashboard.state.data import all_demonstrations
 from sarl_dashboard.text import in_full
 from sarl_dashboard.views.export.files import prepared_for, show_file
@@ -42,4 +43,4 @@ def show_export(demonstrations: Demonstrations) -> None:
         show_matrix(prepared.rule_set, chosen.stem, demonstrations)
     else:
         show_file(prepared.rule_set, chosen)
-        keep_rules_form(prepared.rule_set)
+        keep_rules_form(prepared.rule_set, in_force=chosen.rules == in_force.kind())

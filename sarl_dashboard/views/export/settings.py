@@ -47,6 +47,7 @@ class ExportSettings:
     """What is exported, and how.
 
     Attributes:
+        rules: What they are called.
         rule_set: As it was chosen.
         form: Of the file.
         projection: What a continuous action becomes.
@@ -54,6 +55,7 @@ class ExportSettings:
         merged: Whether conditions on one feature become one interval.
     """
 
+    rules: str
     rule_set: RuleSet
     form: Format
     projection: Projection
@@ -66,15 +68,20 @@ class ExportSettings:
         return f"rules-{file_name(self.rule_set.source.env_id)}"
 
 
-def chosen_rules() -> RuleSet:
-    """The rules to carry away; where there are none to be had, say why and stop."""
+def chosen_rules() -> tuple[str, RuleSet]:
+    """The rules to carry away; where there are none to be had, say why and stop.
+
+    Returns:
+        What they are called, and the rules.
+    """
+    choice = rule_set_choice("carry", without=tuple(PAPERS))
     try:
-        rule_set = rules_for(rule_set_choice("carry", without=tuple(PAPERS)))
+        rule_set = rules_for(choice)
     except SarlError as error:
         refuse(error)
         st.stop()
     assert rule_set is not None
-    return rule_set
+    return choice, rule_set
 
 
 def settings() -> ExportSettings:
@@ -82,7 +89,7 @@ def settings() -> ExportSettings:
     with st.container(border=True):
         left, middle, right = st.columns([4, 5, 3], gap="medium")
         with left:
-            rule_set = chosen_rules()
+            choice, rule_set = chosen_rules()
         with middle:
             name = st.pills(
                 "Format",
@@ -112,4 +119,4 @@ def settings() -> ExportSettings:
                 help="Several conditions on one feature become one interval, and each rule stands "
                 "by itself: easier to read, slower to execute",
             )
-    return ExportSettings(rule_set, form, projection, rounded, merged)
+    return ExportSettings(choice, rule_set, form, projection, rounded, merged)

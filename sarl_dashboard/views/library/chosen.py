@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,11 @@ from sarl_core.errors import SarlError
 from sarl_core.library import Item, Library
 from sarl_core.library.bundles import ENDING, export_bundle
 from sarl_core.library.contents import rules_of
+from sarl_core.library.items import UNLISTED
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.state import in_force
 from sarl_dashboard.state.data import choose_dataset
+from sarl_dashboard.state.rule_choice import comparison_address
 from sarl_dashboard.state.url import set_url_choice
 from sarl_dashboard.text import escaped, file_name
 from sarl_dashboard.views.library.contents import show_content
@@ -40,7 +44,11 @@ def show_chosen(opened: Library, item: Item, author: str) -> None:
         return
     with st.container(border=True):
         st.subheader(escaped(item.name))
-        facts = [KINDS[item.kind], about(item), size_text(item.size) if item.files else ""]
+        facts = [
+            KINDS.get(item.kind, "Kept for a link"),
+            about(item),
+            size_text(item.size) if item.files else "",
+        ]
         st.caption(
             f"{' · '.join(filter(None, facts))} · "
             f"kept by {escaped('you' if own else item.author)} on "
@@ -73,6 +81,19 @@ def _buttons(opened: Library, item: Item, author: str, *, own: bool) -> None:
                 args=(item.id,),
                 help="Every page then works on them; the address is a link for others.",
             )
+        if item.kind == "rules":
+            st.button(
+                "Put in force",
+                type="primary",
+                icon=":material/rule:",
+                key="library_in_force",
+                on_click=_put_in_force,
+                args=(opened, item),
+                help="On every page, with the data that they are from; the address is a link for "
+                "others.",
+            )
+        if item.kind in UNLISTED:
+            return
         download(
             "To carry elsewhere",
             partial(_bundle, opened, item),
@@ -120,7 +141,8 @@ def _rules(opened: Library, item: Item, author: str) -> None:
             for one in versions:
                 mark = "this one" if one.id == item.id else "open"
                 who = ", ".join(approval.author for approval in one.approvals)
-                st.button(
+                row = st.container(horizontal=True, vertical_alignment="center", gap="small")
+                row.button(
                     f"{one.created.astimezone():%d %b %Y, %H:%M:%S} · {about(one)}"
                     + (f" · approved by {escaped(who)}" if who else ""),
                     key=f"version_{one.id}",
@@ -130,6 +152,13 @@ def _rules(opened: Library, item: Item, author: str) -> None:
                     on_click=set_url_choice,
                     args=("item", one.id),
                 )
+                if one.id != item.id:
+                    row.page_link(
+                        "difference.py",
+                        label="Compare with it",
+                        icon=":material/difference:",
+                        query_params=comparison_address(one.id, item.id),
+                    )
     with st.expander("Approve this version", icon=":material/verified:"):
         st.caption(
             "You say by your name that you stand for these very rules. A change makes another "
@@ -142,6 +171,16 @@ def _rules(opened: Library, item: Item, author: str) -> None:
             on_click=_approve,
             args=(opened, item, author),
         )
+
+
+def _put_in_force(opened: Library, item: Item) -> None:
+    """Choose the rules, and the data that they were made from where these are kept."""
+    for identifier in item.came_from:
+        with suppress(SarlError):
+            source = opened.item(identifier)
+            if source.kind == "demonstrations" and source.removed is None:
+                choose_dataset(source.id)
+    in_force.choose(item.id)
 
 
 def _approve(opened: Library, item: Item, author: str) -> None:

@@ -103,7 +103,12 @@ def about(item: Item) -> str:
     """What is in a thing, in a few words."""
     details = item.details
     parts = []
-    for key, noun in (("steps", "step"), ("episodes", "episode"), ("rules", "rule")):
+    for key, noun in (
+        ("steps", "step"),
+        ("episodes", "episode"),
+        ("rules", "rule"),
+        ("edits", "edit"),
+    ):
         number = details.get(key)
         if isinstance(number, int):
             parts.append(counted(number, noun))
