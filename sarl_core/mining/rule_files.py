@@ -251,17 +251,17 @@ _Whole = Annotated[int, Meta(ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)]
 _Action = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
 
 
-class Part(Struct, forbid_unknown_fields=True):
+class DocumentPart(Struct, forbid_unknown_fields=True):
     """A part of a document that holds nothing that is not known."""
 
 
-class _Indicator(Part):
+class _Indicator(DocumentPart):
     column: str
     value: str
     otherwise: str = ""
 
 
-class _Definition(Part):
+class _Definition(DocumentPart):
     terms: tuple[tuple[int, Number], tuple[int, Number]] | None = None
     formula: str | None = None
 
@@ -282,7 +282,7 @@ class _Definition(Part):
         return combination
 
 
-class _Feature(Part):
+class _Feature(DocumentPart):
     name: str
     unit: str = ""
     indicator: _Indicator | None = None
@@ -325,7 +325,7 @@ class _Feature(Part):
         return Feature(self.name, self.unit, indicator, splits=splits_of)
 
 
-class _Discrete(Part, tag_field="kind", tag="discrete"):
+class _Discrete(DocumentPart, tag_field="kind", tag="discrete"):
     name: str
     labels: tuple[str, ...]
     first: _Whole = 0
@@ -341,7 +341,7 @@ class _Discrete(Part, tag_field="kind", tag="discrete"):
         return LabelledDimension(self.name, self.labels, first=self.first, codes=self.codes)
 
 
-class _Interval(Part, tag_field="kind", tag="interval"):
+class _Interval(DocumentPart, tag_field="kind", tag="interval"):
     name: str
     edges: list[_Action]
     bounds_from: str = "action space"
@@ -356,26 +356,26 @@ class _Interval(Part, tag_field="kind", tag="interval"):
         return LabelledDimension.of_edges(self.name, edges, bounds_from=self.bounds_from)
 
 
-class _Thresholds(Part):
+class _Thresholds(DocumentPart):
     support: Share
     confidence: Share
     lift: NotNegative = 0.0
     max_depth: Count | None = None
 
 
-class _Demonstrations(Part):
+class _Demonstrations(DocumentPart):
     digest: str
     steps: _FromOne
     episodes: _FromOne
 
 
-class _Condition(Part, gc=False):
+class _Condition(DocumentPart, gc=False):
     feature: int
     op: Operator
     threshold: Number
 
 
-class _Box(Part):
+class _Box(DocumentPart):
     least: tuple[Number, ...]
     low: tuple[Number, ...]
     high: tuple[Number, ...]
@@ -392,7 +392,7 @@ class _Box(Part):
         return box
 
 
-class _HeldOutPairs(Part):
+class _HeldOutPairs(DocumentPart):
     """Of version 1, which did not say in how many episodes they lie."""
 
     samples: Count
@@ -429,7 +429,7 @@ _P = TypeVar("_P")
 _T = TypeVar("_T")
 
 
-class _Rule(Part, Generic[_Held]):
+class _Rule(DocumentPart, Generic[_Held]):
     id: str
     dimension: int
     conditions: list[_Condition]
@@ -508,7 +508,7 @@ def _features(entries: Sequence[_Feature], version: int) -> tuple[Feature, ...]:
     return each(entries, "features", read)
 
 
-class _Document(Part, Generic[_Held]):
+class _Document(DocumentPart, Generic[_Held]):
     format: str
     version: int
     env_id: str

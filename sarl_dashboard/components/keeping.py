@@ -49,4 +49,4 @@ def _history() -> tuple[tuple[Edit, ...], str]:
     base = rule_base.base()
     made = edits.history(base).edits if rules_in_force.is_edited() else ()
     name = rule_base.base_name()
-    return made, name if rule_base.is_kept(name) else ""
+    return made, name if rule_base.is_in_library(name) else ""

@@ -24,7 +24,7 @@ from sarl_dashboard.state.mined import rules_at
 from sarl_dashboard.state.rule_files import (
     CHOSEN,
     COMPACT_ENDINGS,
-    KEPT,
+    IN_LIBRARY,
     OWN_FILE,
     as_named,
     compact_rules,
@@ -83,7 +83,7 @@ def base_kind() -> str:
     name = base_name()
     if name == THRESHOLDS:
         return CHOSEN
-    return name if name in (*COMPACT_ENDINGS, OWN_FILE) else KEPT
+    return name if name in (*COMPACT_ENDINGS, OWN_FILE) else IN_LIBRARY
 
 
 def problem() -> str:
@@ -162,7 +162,7 @@ def _fixed_base(name: str) -> Base:
             "sidebar"
         )
     item = library.standing_item(name)
-    return Base(KEPT, f"kept {item.digest}", as_named(library.stored_rules(item)), item.name)
+    return Base(IN_LIBRARY, f"kept {item.digest}", as_named(library.stored_rules(item)), item.name)
 
 
 def take_file(content: bytes, name: str) -> None:
@@ -199,18 +199,18 @@ def labels() -> dict[str, str]:
         if len(named) >= _MOST_LISTED:
             break
         if item.id == chosen or (item.details.get("environment") or env_id) == env_id:
-            named[item.id] = _free(named, item.name, kept_label(item.id))
+            named[item.id] = _free(named, item.name, library_label(item.id))
     if chosen not in named:
         named[chosen] = _free(named, _name_of(chosen), f"{_name_of(chosen)} ({chosen[:26]})")
     return named
 
 
-def is_kept(name: str) -> bool:
+def is_in_library(name: str) -> bool:
     """Whether rules are called by an id of the library."""
     return library.is_id(name)
 
 
-def kept_label(identifier: str) -> str:
+def library_label(identifier: str) -> str:
     """What kept rules are called beside other versions of them."""
     try:
         item = library.standing_item(identifier)
@@ -219,7 +219,7 @@ def kept_label(identifier: str) -> str:
     return f"{item.name} ({item.created.astimezone():%d %b, %H:%M:%S})"
 
 
-def kept_rules(identifier: str) -> RuleSet:
+def library_rules(identifier: str) -> RuleSet:
     """Rules of the library, in the order and under the names of the chosen demonstrations.
 
     Raises:

@@ -11,7 +11,7 @@ from sarl_dashboard.state.rule_files import (
     COMPACT_ENDINGS,
     EDITED,
     IN_FORCE,
-    KEPT,
+    IN_LIBRARY,
     NO_RULES,
     OWN_FILE,
     PAPERS,
@@ -38,10 +38,10 @@ def rules_for(choice: str) -> RuleSet | None:
         return None
     if choice == IN_FORCE:
         return in_force.rules()
-    if choice in (KEPT, UNEDITED, OWN_FILE):
+    if choice in (IN_LIBRARY, UNEDITED, OWN_FILE):
         return rule_base.base().rule_set
-    if rule_base.is_kept(choice):
-        return rule_base.kept_rules(choice)
+    if rule_base.is_in_library(choice):
+        return rule_base.library_rules(choice)
     if choice in COMPACT_ENDINGS:
         return compact_rules(choice)
     if choice == EDITED:
@@ -53,7 +53,7 @@ def rules_for(choice: str) -> RuleSet | None:
 
 def rules_called(choice: str) -> str:
     """What chosen rules are called beside others: of kept ones, and of a file, their name."""
-    return rule_base.base().name if choice in (KEPT, OWN_FILE) else choice
+    return rule_base.base().name if choice in (IN_LIBRARY, OWN_FILE) else choice
 
 
 def edited_rules() -> RuleSet:

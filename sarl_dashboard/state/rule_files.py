@@ -23,7 +23,7 @@ from sarl_dashboard.state.data import (
     shipped_demonstrations,
 )
 
-OWN_FILE, KEPT = "own file", "kept"
+OWN_FILE, IN_LIBRARY = "own file", "kept"
 IN_FORCE, EDITED = "in force", "edited"
 CHOSEN, UNEDITED = "at the thresholds", "before the edits"
 NO_RULES, NO_SHIELD = "none", "no shield"

@@ -19,18 +19,18 @@ from sarl_core.mining.editing.edits import (
     Switch,
     Unpin,
 )
-from sarl_core.mining.rule_files import Part, RuleDocument, each, rule_document
+from sarl_core.mining.rule_files import DocumentPart, RuleDocument, each, rule_document
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 
 FORMAT, VERSION = "sarl-edits", 1
 
 
-class _Entry(Part, tag_field="do"):
+class _EditEntry(DocumentPart, tag_field="do"):
     """One edit."""
 
 
-class _SwitchEntry(_Entry, tag="switch"):
+class _SwitchEntry(_EditEntry, tag="switch"):
     rule_id: str
     on: bool
 
@@ -38,14 +38,14 @@ class _SwitchEntry(_Entry, tag="switch"):
         return Switch(self.rule_id, on=self.on)
 
 
-class _UnpinEntry(_Entry, tag="unpin"):
+class _UnpinEntry(_EditEntry, tag="unpin"):
     rule_id: str
 
     def read(self, _: RuleSet) -> Edit:
         return Unpin(self.rule_id)
 
 
-class _MoveEntry(_Entry, tag="move"):
+class _MoveEntry(_EditEntry, tag="move"):
     rule_id: str
     up: bool
 
@@ -53,14 +53,14 @@ class _MoveEntry(_Entry, tag="move"):
         return Move(self.rule_id, up=self.up)
 
 
-class _RemoveEntry(_Entry, tag="remove"):
+class _RemoveEntry(_EditEntry, tag="remove"):
     rule_id: str
 
     def read(self, _: RuleSet) -> Edit:
         return Remove(self.rule_id)
 
 
-class _WithRule(_Entry):
+class _WithRule(_EditEntry):
     """An edit that holds a rule."""
 
     rule: RuleDocument
@@ -85,7 +85,7 @@ class _ChangeEntry(_WithRule, tag="change"):
         return Change(self.rule_of(rule_set))
 
 
-class _RegrowEntry(_Entry, tag="regrow"):
+class _RegrowEntry(_EditEntry, tag="regrow"):
     part: str
 
     def read(self, _: RuleSet) -> Edit:
@@ -107,7 +107,7 @@ _AnyEntry = (
 )
 
 
-class _EditsDocument(Part):
+class _EditsDocument(DocumentPart):
     format: str
     version: int
     edits: list[_AnyEntry]

@@ -26,7 +26,7 @@ from sarl_dashboard.state import in_force
 from sarl_dashboard.state.agents import FRESH_SEED, agent_for, offered_agents
 from sarl_dashboard.state.environments import demonstrated, environment_of
 from sarl_dashboard.state.rule_choice import rules_for
-from sarl_dashboard.state.rule_files import KEPT, OWN_FILE
+from sarl_dashboard.state.rule_files import IN_LIBRARY, OWN_FILE
 
 MOST_EPISODES = 500
 
@@ -52,7 +52,9 @@ class AblationChoice:
     def on_demonstrated_seeds(self) -> bool:
         """Whether some of its episodes are among the demonstrated ones."""
         row, episodes = self.wanted.row, self.wanted.episodes
-        return self.rules not in (KEPT, OWN_FILE) and demonstrated(row.env_id, row.seed, episodes)
+        return self.rules not in (IN_LIBRARY, OWN_FILE) and demonstrated(
+            row.env_id, row.seed, episodes
+        )
 
 
 def settings() -> AblationChoice:

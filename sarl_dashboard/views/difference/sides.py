@@ -41,15 +41,17 @@ def chosen_sides() -> list[Side]:
     """
     chosen = _named()
     offered = offered_rule_sets(RULE_SETS)
-    kept = {name: label for name, label in rule_base.labels().items() if rule_base.is_kept(name)}
+    stored = {
+        name: label for name, label in rule_base.labels().items() if rule_base.is_in_library(name)
+    }
     for name in chosen:
-        if rule_base.is_kept(name) and name not in kept:
-            kept[name] = rule_base.kept_label(name)
+        if rule_base.is_in_library(name) and name not in stored:
+            stored[name] = rule_base.library_label(name)
     st.session_state["_sets_choice"] = chosen
     st.multiselect(
         "Rule sets",
-        [*offered, *kept, *(name for name in chosen if name not in (*offered, *kept))],
-        format_func=lambda name: kept.get(name, name),
+        [*offered, *stored, *(name for name in chosen if name not in (*offered, *stored))],
+        format_func=lambda name: stored.get(name, name),
         key="_sets_choice",
         max_selections=MOST,
         on_change=_choose,
@@ -63,7 +65,7 @@ def chosen_sides() -> list[Side]:
             st.info(in_full(str(error)), icon=":material/link_off:")
             continue
         assert rule_set is not None
-        sides.append(Side(rule_set, kept.get(name, name)))
+        sides.append(Side(rule_set, stored.get(name, name)))
     return sides
 
 

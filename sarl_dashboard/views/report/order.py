@@ -26,7 +26,7 @@ from sarl_dashboard.state.mined import grown_trees
 from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.state.rule_files import (
     COMPACT_ENDINGS,
-    KEPT,
+    IN_LIBRARY,
     OWN_FILE,
     compact_file,
     fitting_demonstrations,
@@ -108,7 +108,7 @@ def file_names(choices: ReportChoices) -> tuple[str, str]:
     rules = "rules.json"
     if choices.rules in COMPACT_ENDINGS:
         rules = f"data/rules/{compact_file(choices.rules).name}"
-    elif choices.rules == KEPT:
+    elif choices.rules == IN_LIBRARY:
         rules = f"{PREFIX}{rule_base.base_name()}"
     elif choices.rules == OWN_FILE:
         rules = rule_base.base().name
@@ -123,7 +123,7 @@ def commands(
     if raw is None or raw.digest != demonstrations.deriving(raw.derived).digest:
         return ()  # episodes are held out or left out, or things have other names
     mined = None
-    if choices.rules not in (*COMPACT_ENDINGS, KEPT, OWN_FILE):
+    if choices.rules not in (*COMPACT_ENDINGS, IN_LIBRARY, OWN_FILE):
         mined = mining_command(
             rule_set, named.rules, named.demonstrations, demonstrations, read=raw
         )

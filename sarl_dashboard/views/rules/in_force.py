@@ -20,7 +20,7 @@ from sarl_dashboard.state.rule_files import fitting_demonstrations
 from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
 
 
-class Place(NamedTuple):
+class TreePlace(NamedTuple):
     """A node of a tree."""
 
     tree: PolicyTree
@@ -47,13 +47,13 @@ class InForce:
     rule_set: RuleSet
     edits: int = 0
 
-    def place(self, rule: Rule) -> Place | None:
+    def place(self, rule: Rule) -> TreePlace | None:
         """Where a rule was cut; None where it is no node of these trees."""
         if rule.dimension >= len(self.trees):
             return None
         tree = self.trees[rule.dimension]
         node = node_in(tree, rule, self.rule_set, leaves=self.compact is not None)
-        return None if node is None else Place(tree, node)
+        return None if node is None else TreePlace(tree, node)
 
 
 def rules_in_force(demonstrations: Demonstrations) -> InForce:

@@ -28,7 +28,7 @@ from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components import tree_picture
 from sarl_dashboard.state import rule_base
-from sarl_dashboard.views.rules.in_force import InForce, Place
+from sarl_dashboard.views.rules.in_force import InForce, TreePlace
 
 
 def show_rule(rule: Rule, in_force: InForce, buttons: Callable[[], None]) -> None:
@@ -103,7 +103,7 @@ def show_origin(rule: Rule, rule_set: RuleSet) -> None:
     )
 
 
-def path_of(place: Place, in_force: InForce) -> tree_picture.PathInTree:
+def path_of(place: TreePlace, in_force: InForce) -> tree_picture.PathInTree:
     """The path to a rule."""
     return tree_picture.PathInTree(
         tree=place.tree,
