@@ -16,8 +16,8 @@ from sarl_dashboard.views.ablation.settings import settings
 
 st.title("Worth of each rule")
 st.caption(
-    "What each rule is worth: the same episodes again, with one rule taken out. A rule without "
-    "which an agent does worse carries load; one without which it does better does harm."
+    "What each rule is worth: the same episodes again with one rule taken out, so that one sees "
+    "which rules carry load, which do harm, and which do nothing."
 )
 try:
     choice = settings()

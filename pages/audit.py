@@ -10,8 +10,8 @@ from sarl_dashboard.views.audit.timeline import show_timeline
 
 st.title("Audit")
 st.caption(
-    "Rules held against a log of what somebody did: a person, a controller, an agent in operation. "
-    "It needs no environment."
+    "Rules held against a log of what somebody did (a person, a controller, an agent in "
+    "operation), for which no environment is needed."
 )
 rules = chosen_rules()
 logs = chosen_logs(rules)

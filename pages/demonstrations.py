@@ -21,8 +21,8 @@ from sarl_dashboard.views.demonstrations.upload import upload_section
 
 st.title("Demonstrations")
 st.caption(
-    "What the expert did: at every step a state, and the action taken in it. Rules are "
-    "mined from these pairs."
+    "What the expert did: at every step a state and the action taken in it, the pairs that rules "
+    "are mined from."
 )
 demonstrations = uncombined_demonstrations()
 upload_section(expanded=demonstrations is None)

@@ -13,8 +13,7 @@ from sarl_dashboard.views.edit.editing import editing
 st.title("Edit")
 st.caption(
     "Switch rules off, pin them, move them, add your own, or let a part of the tree grow anew from "
-    "another query. Edits lie on top of the rules that are chosen in the sidebar, stay while the "
-    "thresholds move, and are in force on every page."
+    "another query: edits stay while the thresholds move, and are in force on every page."
 )
 base = edited_base()
 if base.name:

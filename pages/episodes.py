@@ -10,7 +10,7 @@ from sarl_dashboard.views.episodes.steps import show_episodes
 st.title("Episodes")
 st.caption(
     "What was demonstrated, one episode at a time: the actions, the rule that applies at each "
-    "step, and the features. Click a step to look at it."
+    "step, and the features."
 )
 require_demonstrations()
 demonstrations = all_demonstrations()

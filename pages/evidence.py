@@ -23,8 +23,8 @@ from sarl_dashboard.views.evidence.stability import show_stability
 
 st.title("Evidence")
 st.caption(
-    "How sure each rule is: how often it was right, and in how many episodes that it was not mined "
-    "from. Each episode counts once, because its steps are alike."
+    "How sure each rule is: how often it was right in episodes that it was not mined from, and in "
+    "how many of them, each counted once because its steps are alike."
 )
 require_demonstrations()
 demonstrations = all_demonstrations()

@@ -9,8 +9,8 @@ from sarl_dashboard.views.export.export import show_export
 
 st.title("Export")
 st.caption(
-    "Carry the rules into other code, onto paper, or to somebody else, and check with test vectors "
-    "that they decide there as here. The rules are learned from demonstrations: they guarantee "
-    "nothing."
+    "Carry the rules, which are learned from demonstrations and guarantee nothing, into other "
+    "code, onto paper, or to somebody else, with test vectors that show whether they decide there "
+    "as here."
 )
 show_export(require_demonstrations())

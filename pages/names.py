@@ -23,10 +23,8 @@ from sarl_dashboard.views.names.tables import (
 
 st.title("Names")
 st.caption(
-    "What features, units, actions and labels are called, in every sentence, axis and export, and "
-    "what is worked out from the features. Another name changes no rule; a formula is one more "
-    "feature that rules may ask about. Both are kept while this page is open in your browser; the "
-    "Parquet file takes them along."
+    "What features, units, actions and labels are called in every sentence, axis and export, which "
+    "changes no rule, and what formulas work out from the features, which rules may then ask about."
 )
 require_demonstrations()
 raw = raw_demonstrations()

@@ -14,9 +14,8 @@ from sarl_dashboard.views.replay.steps import step_by_step
 
 st.title("Replay")
 st.caption(
-    "An agent in its environment, with the rules as a shield and without. An action that "
-    "breaks a rule is replaced before it is executed. The rules are learned from "
-    "demonstrations: they guarantee nothing."
+    "An agent with the rules as a shield, which replaces actions that break one, and without; the "
+    "rules are learned from demonstrations and guarantee nothing."
 )
 set_out()
 result, form = st.container(), st.container()

@@ -19,8 +19,8 @@ from sarl_dashboard.views.shield.table import comparison_of
 
 st.title("Measure")
 st.caption(
-    "What a shield is worth: agents with the rules and without, on the same seeds. The rules are "
-    "learned from demonstrations; they guarantee nothing."
+    "What a shield is worth that was learned from demonstrations and guarantees nothing: agents "
+    "with the rules and without, on the same seeds."
 )
 choices = settings()
 try:

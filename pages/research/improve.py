@@ -17,9 +17,9 @@ from sarl_dashboard.views.improve.settings import settings
 
 st.title("Improve")
 st.caption(
-    "Rules protect only where the expert showed what to do. Here the rules act, the expert says "
-    "what it would have done in the states they lead to, and few rules are made of all its "
-    "answers. With nobody to ask, the page shows which states need a demonstration."
+    "Better rules of the same expert: they act, it says what it would have done where they lead, "
+    "and few rules are made of all its answers; with nobody to ask, the states that need a "
+    "demonstration."
 )
 demonstrations = require_demonstrations()
 choices = settings(demonstrations)

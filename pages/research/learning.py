@@ -15,8 +15,8 @@ SHIPPED, OWN = "The study", "Your own"
 
 st.title("Learning")
 st.caption(
-    "Agents learn by trial and error while the rules shield them. Two questions: how often do they "
-    "fail meanwhile, and what are they worth when the shield is taken off?"
+    "How often agents fail while they learn by trial and error under the rules, and what they are "
+    "worth when the shield is taken off."
 )
 view = st.segmented_control(
     "View",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
@@ -74,5 +75,14 @@ def test_a_page_without_data_sends_one_to_them_and_no_further() -> None:
 
 @pytest.mark.parametrize("title", TITLES)
 def test_a_page_says_in_one_sentence_under_its_title_what_it_answers(title: str) -> None:
-    source = (ROUTER.parent / TITLES[title]).read_text()
-    assert re.search(r"^st\.caption\(", source, re.MULTILINE)
+    page = ast.parse((ROUTER.parent / TITLES[title]).read_text())
+    calls = [
+        statement.value
+        for statement in page.body
+        if isinstance(statement, ast.Expr) and isinstance(statement.value, ast.Call)
+    ]
+    shown = [call for call in calls if ast.unparse(call.func) in ("st.title", "st.caption")]
+    assert [ast.unparse(call.func) for call in shown[:2]] == ["st.title", "st.caption"]
+    subtitle = ast.literal_eval(shown[1].args[0])
+    assert re.findall(r"[.?!](?= |$)", subtitle) == ["."]
+    assert subtitle.endswith(".")

@@ -40,7 +40,7 @@ def show_episodes(demonstrations: Demonstrations) -> None:
         current = _number("Step", "step", held.steps - 1)
     st.caption(
         f"{counted(held.steps, 'step')}. Some rule applies in {share_text(held.coverage)} of them; "
-        f"the expert broke one in {counted(held.broken, 'step')}."
+        f"the expert broke one in {counted(held.broken, 'step')}. Click a step to look at it."
     )
     first = current // _MOST_STEPS * _MOST_STEPS
     rows = slice(first, min(first + _MOST_STEPS, held.steps))
