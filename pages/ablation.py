@@ -9,6 +9,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.errors import SarlError
+from sarl_dashboard.components.journey.environment_needed import require_environment
 from sarl_dashboard.components.settings import known_seeds_notice
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.ablation.outcome import outcome
@@ -19,6 +20,7 @@ st.caption(
     "What each rule is worth: the same episodes again with one rule taken out, so that one sees "
     "which rules carry load, which do harm, and which do nothing."
 )
+require_environment()
 try:
     choice = settings()
 except SarlError as error:

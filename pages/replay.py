@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import streamlit as st
 
+from sarl_dashboard.components.journey.environment_needed import require_environment
 from sarl_dashboard.jobs.replays import REPLAY, arrived, latest
 from sarl_dashboard.views.replay.episodes import comparison, take_up
 from sarl_dashboard.views.replay.film import film, headline
@@ -18,6 +19,7 @@ st.caption(
     "rules are learned from demonstrations and guarantee nothing."
 )
 set_out()
+require_environment()
 result, form = st.container(), st.container()
 with form:
     choices = settings()

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import streamlit as st
 
-from sarl_core.environments.description import describe_environment
 from sarl_core.errors import SarlError
+from sarl_dashboard.components.journey.environment_needed import require_environment
 from sarl_dashboard.components.settings import known_seeds_notice
 from sarl_dashboard.state.environments import demonstrated, environment_of
 from sarl_dashboard.text import refuse
@@ -22,10 +22,10 @@ st.caption(
     "What a shield is worth that was learned from demonstrations and guarantees nothing: agents "
     "with the rules and without, on the same seeds."
 )
+require_environment()
 choices = settings()
 try:
     env_id = environment_of(choices.env)
-    describe_environment(env_id)
     agents = pilots(choices, env_id)
 except SarlError as error:
     refuse(error)

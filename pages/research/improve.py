@@ -9,6 +9,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.errors import SarlError
+from sarl_dashboard.components.journey.environment_needed import require_environment
 from sarl_dashboard.state.data import require_demonstrations
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.improve.order import order_of
@@ -22,6 +23,7 @@ st.caption(
     "demonstration."
 )
 demonstrations = require_demonstrations()
+require_environment()
 choices = settings(demonstrations)
 order = None
 try:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import streamlit as st
 
-from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
 from sarl_core.rollouts.player import check_environment
 from sarl_core.shielding.shield import Shield
@@ -108,7 +107,6 @@ def settings() -> AblationChoice:
         policy_file = own_policy(agent, env)
 
     env_id, first = environment_of(env), int(seed or 0)
-    describe_environment(env_id)
     rule_set = rules_for(rules)
     chosen = agent_for(agent, policy_file, env_id, first)
     if rule_set is None or not any(rule.enabled for rule in rule_set.rules):

@@ -8,6 +8,7 @@ from sarl_core.errors import SarlError
 from sarl_core.learning.study_files import LearningStudy, policy_path
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.journey.environment_needed import require_own_environment
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.jobs.learning import LearningOrder, learning, study_of
@@ -21,6 +22,8 @@ LOOK_SECONDS = 2.0
 
 def show_own() -> None:
     """Settings, progress, and all that is known so far."""
+    if not PLACE.at_work:  # what learns can be looked at, and stopped, whatever is chosen
+        require_own_environment()
     order = settings()
     if order is None and not PLACE.at_work:
         return
