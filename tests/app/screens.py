@@ -6,6 +6,7 @@ import re
 import time
 from html import unescape
 from pathlib import Path
+from typing import Any
 
 from streamlit.testing.v1 import AppTest
 
@@ -48,6 +49,17 @@ def html(app: AppTest) -> str:
 def errors(app: AppTest) -> list[str]:
     """The sentences of errors, Markdown's escapes undone."""
     return [unescape(str(error.value).replace("\\", "")) for error in app.error]
+
+
+def shown_and_further(app: AppTest) -> tuple[set[str], set[str]]:
+    """Keys of the settings that a form shows, and of those that it keeps under "More"."""
+
+    def settings(block: Any) -> set[str]:
+        kinds = ("selectbox", "number_input", "slider", "button_group")
+        return {widget.key for kind in kinds for widget in block.get(kind)}
+
+    (more,) = (one for one in app.main.get("popover") if one.proto.popover.label == "More")
+    return settings(app.main) - settings(more), settings(more)
 
 
 def metrics(app: AppTest) -> dict[str, str]:

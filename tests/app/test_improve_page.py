@@ -22,7 +22,7 @@ from sarl_core.improving.plan import Plan
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rules import Thresholds
 from sarl_dashboard.views.improve.order import command_for
-from tests.app.screens import errors, metrics, open_page, texts
+from tests.app.screens import errors, metrics, open_page, shown_and_further, texts
 
 DATA = Path(__file__).parents[2] / "data"
 CARTPOLE = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
@@ -101,6 +101,34 @@ def test_the_shipped_rules_show_how_they_came_about(shipped: Path, expected: Agg
     rounds, by_number = specs(app)
     assert rounds["layout"]["yaxis4"]
     assert by_number["data"][0]["name"].startswith("one feature a query")
+    assert "No results are shipped" not in texts(app)
+
+
+def test_no_results_of_another_task_stand_beside_one_s_own_data(shipped: Path) -> None:
+    point = {"rules": 4, "mean": 400.0, "std": 10.0, "episodes": 100}
+    budgets = {"environments": {"CartPole-v1": [point], "LunarLander-v3": [point]}}
+    (shipped / "budgets.json").write_text(json.dumps(budgets))
+    app = open_page("improve", data="cartpole")
+    assert len(app.get("plotly_chart")) == 1
+    assert "fresh episodes of Cart Pole" in texts(app)
+    other = open_page("improve", data="pendulum")
+    assert not other.get("plotly_chart")
+    assert "No results are shipped for Pendulum-v1" in texts(other)
+    assert "How many rules it takes" not in texts(other)
+
+
+def test_the_form_shows_what_most_need_and_keeps_the_rest_at_hand() -> None:
+    assert shown_and_further(open_page("improve", data="cartpole")) == (
+        {"env", "expert", "max_rules", "rounds"},
+        {"cut", "round_episodes", "validation", "choose", "refine", "improve_seed"},
+    )
+    assert shown_and_further(open_page("improve", data="pendulum", expert="nobody")) == (
+        {"env", "expert", "round_episodes"},
+        {"improve_seed", "divider"},
+    )
+    app = open_page("improve", data="cartpole", validation="32", improve_seed="7")
+    assert app.number_input(key="validation").value == 32
+    assert app.number_input(key="improve_seed").value == 7
 
 
 @pytest.mark.parametrize(

@@ -30,7 +30,7 @@ from sarl_core.learning.study_files import (
 )
 from sarl_core.shipped import DATA
 from sarl_dashboard.jobs import learning
-from tests.app.screens import errors, open_page, texts
+from tests.app.screens import errors, open_page, shown_and_further, texts
 
 ROOT = Path(__file__).parents[2]
 
@@ -119,8 +119,11 @@ def test_for_other_demonstrations_it_says_that_no_study_is_theirs(
 ) -> None:
     monkeypatch.setattr(learning, "STUDIES", small_study)
     app = open_page("learning", data="pendulum")
-    assert "For Pendulum-v1 no study is shipped" in texts(app)
-    assert app.dataframe
+    (said,) = app.info
+    assert said.value.startswith("For Pendulum-v1 no study is shipped: make one under “Your own”")
+    assert said.value.endswith("such as Cart Pole.")
+    assert not app.dataframe
+    assert not app.get("plotly_chart")
 
 
 def test_without_a_shipped_study_it_says_what_can_be_done(
@@ -229,6 +232,16 @@ def test_who_can_be_compared_with_depends_on_the_environment() -> None:
         "untrained",
         "expert",
     ]
+
+
+def test_the_form_shows_what_most_need_and_keeps_the_rest_at_hand() -> None:
+    assert shown_and_further(own()) == (
+        {"learn_rules", "learn_steps", "learn_seeds", "learn_arms", "learn_view"},
+        {"learn_episodes", "learn_choose", "learn_compare"},
+    )
+    _, further = shown_and_further(own(data="pendulum"))
+    assert further == {"learn_episodes", "projection", "learn_choose", "learn_compare"}
+    assert own(learn_episodes="7").number_input(key="learn_episodes").value == 7
 
 
 def test_stopped_learning_is_kept_and_goes_on(own_folder: Path) -> None:

@@ -61,11 +61,9 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
     """The widgets."""
     expert = st.session_state.get("expert") or st.query_params.get("expert")
     has_expert = expert != NOBODY
-    max_rules, cut, rounds, refinement, validation = MIN_RULES, EVERY_LEAF, 1, 0, 1
-    divider, policy_file = MIN_DIVIDER, None
-    choose: Choice = "return"
+    max_rules, rounds, episodes, policy_file = MIN_RULES, 1, 0, None
     with st.container(border=True):
-        with st.grid(5, min_column_width=150, gap="small"):
+        with st.grid(4 if has_expert else 3, min_column_width=150, gap="small"):
             env = environment_choice()
             experts = (SHIPPED_EXPERT, *own_agents(), OWN_FILE, NOBODY)
             expert = st.selectbox(
@@ -87,15 +85,6 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                     24,
                     "Of each action. Few can be read, more achieve more.",
                 )
-                cut = st.selectbox(
-                    "Rules are",
-                    (EVERY_LEAF, AT_THRESHOLDS),
-                    key="cut",
-                    bind="query-params",
-                    help="Every leaf: in every state some rule applies. At the thresholds: only "
-                    "where support and confidence reach those in the sidebar; elsewhere the agent "
-                    "acts alone.",
-                )
                 rounds = number(
                     "Rounds",
                     "rounds",
@@ -104,60 +93,10 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                     10,
                     "How often the rules act and the expert answers. The best round is kept.",
                 )
-            episodes = number(
-                "Episodes a round" if has_expert else "Episodes",
-                "round_episodes",
-                1,
-                MOST,
-                20,
-                "In each of them the rules shield a novice, which acts at random.",
-            )
-            if has_expert:
-                validation = number(
-                    "Episodes to choose by",
-                    "validation",
-                    1,
-                    MOST,
-                    128,
-                    "All rounds are tried on a few episodes, the better half on twice as many, "
-                    "and so on; the last one left on this many.",
-                )
-                choose = st.selectbox(
-                    "Choose by",
-                    tuple(CHOICE_TEXTS),
-                    key="choose",
-                    bind="query-params",
-                    format_func=lambda name: f"{name} first",
-                    help="Which of the tried is the best. Return: the highest mean return. "
-                    "Failures: the fewest failures, and among equals the highest mean return. It "
-                    "is reported on other episodes.",
-                )
-                if cut == EVERY_LEAF:
-                    none, one = (
-                        refinement_cost(turns, Plan.search_episodes, rounds) for turns in range(2)
-                    )
-                    refinement = number(
-                        "Refinement turns",
-                        "refine",
-                        0,
-                        MOST,
-                        0,
-                        "Afterwards the rules' queries, numbers and actions are changed to where "
-                        "they achieve more, so many times. Each turn takes up to "
-                        f"{one - none:,} episodes, and before the first one some of the rounds "
-                        f"are moved, which takes {none:,}. 0: not at all.",
-                    )
-            seed = number("Seed", "improve_seed", 0, MOST, 0, "Another one gives other episodes.")
-            if not demonstrations.is_discrete:
-                divider = st.slider(
-                    "Divider",
-                    MIN_DIVIDER,
-                    MAX_DIVIDER,
-                    key="divider",
-                    value=MIN_DIVIDER,
-                    bind="query-params",
-                    help="Number of equal intervals each continuous action is divided into.",
-                )
+            else:
+                episodes = _episodes("Episodes")
+        with st.popover("More", icon=":material/tune:"):
+            rest = _further(demonstrations, rounds, has_expert=has_expert)
         if expert == OWN_FILE:
             policy_file = policy_upload("The expert", "expert_file", env)
     return ImproveChoices(
@@ -165,12 +104,96 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
         expert,
         policy_file,
         max_rules,
-        cut,
+        rest.cut,
         rounds,
-        episodes,
-        refinement,
-        validation,
-        seed,
-        divider,
-        choose,
+        episodes or rest.episodes,
+        rest.refinement,
+        rest.validation,
+        rest.seed,
+        rest.divider,
+        rest.choose,
     )
+
+
+@dataclass(frozen=True)
+class FurtherChoices:
+    """What few need to change, as `ImproveChoices` has it."""
+
+    episodes: int
+    cut: str
+    refinement: int
+    validation: int
+    seed: int
+    divider: int
+    choose: Choice
+
+
+def _episodes(label: str) -> int:
+    return number(
+        label,
+        "round_episodes",
+        1,
+        MOST,
+        20,
+        "In each of them the rules shield a novice, which acts at random.",
+    )
+
+
+def _further(demonstrations: Demonstrations, rounds: int, *, has_expert: bool) -> FurtherChoices:
+    """The widgets that most leave as they are."""
+    cut, episodes, refinement, validation, divider = EVERY_LEAF, 0, 0, 1, MIN_DIVIDER
+    choose: Choice = "return"
+    if has_expert:
+        cut = st.selectbox(
+            "Rules are",
+            (EVERY_LEAF, AT_THRESHOLDS),
+            key="cut",
+            bind="query-params",
+            help="Every leaf: in every state some rule applies. At the thresholds: only where "
+            "support and confidence reach those in the sidebar; elsewhere the agent acts alone.",
+        )
+        episodes = _episodes("Episodes a round")
+        validation = number(
+            "Episodes to choose by",
+            "validation",
+            1,
+            MOST,
+            128,
+            "All rounds are tried on a few episodes, the better half on twice as many, and so on; "
+            "the last one left on this many.",
+        )
+        choose = st.selectbox(
+            "Choose by",
+            tuple(CHOICE_TEXTS),
+            key="choose",
+            bind="query-params",
+            format_func=lambda name: f"{name} first",
+            help="Which of the tried is the best. Return: the highest mean return. Failures: the "
+            "fewest failures, and among equals the highest mean return. It is reported on other "
+            "episodes.",
+        )
+        if cut == EVERY_LEAF:
+            none, one = (refinement_cost(turns, Plan.search_episodes, rounds) for turns in range(2))
+            refinement = number(
+                "Refinement turns",
+                "refine",
+                0,
+                MOST,
+                0,
+                "Afterwards the rules' queries, numbers and actions are changed to where they "
+                f"achieve more, so many times. Each turn takes up to {one - none:,} episodes, and "
+                f"before the first one some of the rounds are moved, which takes {none:,}. 0: not "
+                "at all.",
+            )
+    seed = number("Seed", "improve_seed", 0, MOST, 0, "Another one gives other episodes.")
+    if not demonstrations.is_discrete:
+        divider = st.slider(
+            "Divider",
+            MIN_DIVIDER,
+            MAX_DIVIDER,
+            key="divider",
+            value=MIN_DIVIDER,
+            bind="query-params",
+            help="Number of equal intervals each continuous action is divided into.",
+        )
+    return FurtherChoices(episodes, cut, refinement, validation, seed, divider, choose)

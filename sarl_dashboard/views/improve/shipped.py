@@ -18,14 +18,14 @@ from sarl_core.rollouts.failures import rate_text
 from sarl_core.rollouts.statistics import Rate
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.settings import switch
-from sarl_dashboard.state.data import SHIPPED_SETS
+from sarl_dashboard.state.data import SHIPPED_SETS, uncombined_demonstrations
 from sarl_dashboard.state.rule_files import RULES_FOLDER, compact_file, compact_sets
-from sarl_dashboard.text import refuse
+from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.improve.outcome import show_rounds, size_text
 
 BUDGETS = "budgets.json"
 ADVICE = "write it again"
-
+FIGURE_WIDTH = 560  # pixels
 
 ROUNDS = (
     "Choose how many rules there may be, then press Run. Each round the rules act in a novice's "
@@ -52,20 +52,32 @@ def show_shipped(*, gaps: bool) -> None:
     if gaps:
         return
     try:
-        _show_cards()
-        show_budgets()
+        there = [_show_cards(), show_budgets()]
     except SarlError as error:
         refuse(error)
+        return
+    if not any(there):
+        st.caption(
+            f"No results are shipped for {escaped(_task() or 'these data')}; a run shows what few "
+            "rules achieve there."
+        )
 
 
-def _show_cards() -> None:
-    """What the compact sets of the chosen data have achieved, one at a time."""
+def _task() -> str:
+    """The environment of the chosen data, "" where they name none."""
+    demonstrations = uncombined_demonstrations()
+    return "" if demonstrations is None else demonstrations.env_id
+
+
+def _show_cards() -> bool:
+    """What the compact sets of the chosen data have achieved, one at a time; whether there are."""
     names = [name for name in compact_sets() if card_path(compact_file(name)).is_file()]
     if not names:
-        return
+        return False
     st.subheader("The compact rules that are shipped")
     name = names[0] if len(names) == 1 else switch("Compact rules", "shipped_set", names)
     show_card(read_object(card_path(compact_file(name)), ADVICE))
+    return True
 
 
 class Reported(Struct):
@@ -156,30 +168,23 @@ def _policy_of_card(reported: Reported) -> str:
     return f" {POLICY_TEXT}: they changed {changed} of the novice's steps."
 
 
-def show_budgets() -> None:
-    """Return against number of rules, an environment each."""
-    file = RULES_FOLDER / BUDGETS
-    if not file.is_file():
-        return
-    document = read_object(file, ADVICE)
-    budgets = [
-        (label, points)
-        for label, env_id in SHIPPED_SETS.values()
-        if (points := budget_points(document, env_id))
-    ]
-    if not budgets:
-        return
+def show_budgets() -> bool:
+    """Return against number of rules in the environment of the chosen data; whether it is known.
+
+    What was found in another task says nothing of them.
+    """
+    file, env_id = RULES_FOLDER / BUDGETS, _task()
+    if not env_id or not file.is_file():
+        return False
+    points = budget_points(read_object(file, ADVICE), env_id)
+    if not points:
+        return False
+    label = {shipped: label for label, shipped in SHIPPED_SETS.values()}.get(env_id, env_id)
     st.subheader("How many rules it takes")
     st.caption(
-        "What the best rules of each number achieve on fresh episodes, with a novice that acts at "
-        "random. A number of rules is the most of any one action."
+        f"What the best rules of each number achieve on fresh episodes of {escaped(label)}, with a "
+        "novice that acts at random. A number of rules is the most of any one action."
     )
-    with st.grid(min(len(budgets), 3), min_column_width=300) as grid:
-        for index, (label, points) in enumerate(budgets):
-            with grid.cell():
-                st.markdown(f"**{label}**")
-                chart(
-                    budget_figure(points),
-                    f"budget_{index}",
-                    f"{label}: return against the number of rules",
-                )
+    with st.container(width=FIGURE_WIDTH):
+        chart(budget_figure(points), "budget", f"{label}: return against the number of rules")
+    return True

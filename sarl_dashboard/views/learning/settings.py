@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import streamlit as st
 
 from sarl_core.environments.description import describe_environment
@@ -9,8 +11,9 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.learning.arms import ARMS
 from sarl_core.learning.run import TRIAL_EPISODES
 from sarl_core.learning.study import LearningPlan
-from sarl_core.rollouts.choices import CHOICE_TEXTS
-from sarl_dashboard.components.settings import notes_notice, rule_set_choice
+from sarl_core.rollouts.choices import CHOICE_TEXTS, Choice
+from sarl_core.shielding.projection import Projection
+from sarl_dashboard.components.settings import notes_notice, projection_choice, rule_set_choice
 from sarl_dashboard.jobs.learning import LearningOrder
 from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, has_expert, own_agents
 from sarl_dashboard.state.environments import environment_of
@@ -24,8 +27,7 @@ NOBODY = "nobody"
 def settings() -> LearningOrder | None:
     """The widgets; None where what they say cannot be learned, which is then said."""
     with st.container(border=True):
-        discrete = is_discrete()
-        with st.grid(3 if discrete else 4, min_column_width=150, gap="small"):
+        with st.grid(3, min_column_width=150, gap="small"):
             rules = rule_set_choice(
                 "learn_rules", about="In force while learning.", persist_state="session"
             )
@@ -51,47 +53,6 @@ def settings() -> LearningOrder | None:
                 persist_state="session",
                 help="One may have been lucky; three say more.",
             )
-            episodes = st.number_input(
-                "Episodes afterwards",
-                1,
-                MOST_EPISODES,
-                TRIAL_EPISODES,
-                key="learn_episodes",
-                bind="query-params",
-                persist_state="session",
-                help="After learning, of each learner, without the shield and with it.",
-            )
-            projection = PROJECTIONS[0]
-            if not discrete:
-                projection = st.selectbox(
-                    "Replace by",
-                    PROJECTIONS,
-                    key="projection",
-                    bind="query-params",
-                    help="What a continuous action that breaks a rule becomes. Centre: the middle "
-                    "of the rule's interval. Clip: the nearest value in it. Expert: what the "
-                    "expert typically did there.",
-                )
-            choose = st.selectbox(
-                "Choose by",
-                tuple(CHOICE_TEXTS),
-                key="learn_choose",
-                bind="query-params",
-                persist_state="session",
-                format_func=lambda name: f"{name} first",
-                help="Which way to learn is the best of those that are safe and good. Return: the "
-                "highest mean return afterwards. Failures: the fewest failures, and among equals "
-                "the highest mean return. It is reported on other episodes.",
-            )
-            agent = st.selectbox(
-                "Compare with",
-                (NOBODY, *comparable_agents()),
-                key="learn_compare",
-                bind="query-params",
-                persist_state="session",
-                help="An agent that plays the episodes after learning too, without the shield and "
-                "with it, and learns nothing.",
-            )
         names = st.pills(
             "Ways to learn",
             list(ARMS),
@@ -102,13 +63,9 @@ def settings() -> LearningOrder | None:
             bind="query-params",
             persist_state="session",
         )
-        with st.popover("What they do", icon=":material/help:", type="tertiary"):
-            for arm in ARMS.values():
-                st.markdown(f"**{arm.title}.** {arm.what}")
-            st.caption(
-                "PPO, DQN and SAC are the usual learners. PPO learns from what it has just done. "
-                "DQN, and SAC where actions are continuous, learn from a memory of all they did."
-            )
+        with st.container(horizontal=True, vertical_alignment="center", gap="small"):
+            rest = further_settings()
+            explain_arms()
     try:
         env_id = environment_of(None)
         rule_set = rules_for(rules)
@@ -121,14 +78,15 @@ def settings() -> LearningOrder | None:
             chosen,
             int(steps),
             tuple(range(int(seeds))),
-            projection,
-            int(episodes),
-            choose=choose,
+            rest.projection,
+            rest.episodes,
+            choose=rest.choose,
         )
         notes_notice(plan.notes)
     except SarlError as error:
         refuse(error)
         return None
+    agent = rest.agent
     compared = None if agent == NOBODY else (agent, own_agents().get(agent, agent))
     return LearningOrder(
         env_id,
@@ -136,11 +94,75 @@ def settings() -> LearningOrder | None:
         chosen,
         int(steps),
         int(seeds),
-        projection,
-        int(episodes),
-        choose,
+        rest.projection,
+        rest.episodes,
+        rest.choose,
         compared,
     )
+
+
+class FurtherSettings(NamedTuple):
+    """What few need to change.
+
+    Attributes:
+        episodes: After learning, of each learner.
+        projection: What a continuous action that breaks a rule becomes.
+        choose: What the best way to learn is chosen by.
+        agent: Who plays too and learns nothing, or `NOBODY`.
+    """
+
+    episodes: int
+    projection: Projection
+    choose: Choice
+    agent: str
+
+
+def further_settings() -> FurtherSettings:
+    """The widgets that most leave as they are."""
+    with st.popover("More", icon=":material/tune:"):
+        episodes = st.number_input(
+            "Episodes afterwards",
+            1,
+            MOST_EPISODES,
+            TRIAL_EPISODES,
+            key="learn_episodes",
+            bind="query-params",
+            persist_state="session",
+            help="After learning, of each learner, without the shield and with it.",
+        )
+        projection = PROJECTIONS[0] if is_discrete() else projection_choice()
+        choose = st.selectbox(
+            "Choose by",
+            tuple(CHOICE_TEXTS),
+            key="learn_choose",
+            bind="query-params",
+            persist_state="session",
+            format_func=lambda name: f"{name} first",
+            help="Which way to learn is the best of those that are safe and good. Return: the "
+            "highest mean return afterwards. Failures: the fewest failures, and among equals "
+            "the highest mean return. It is reported on other episodes.",
+        )
+        agent = st.selectbox(
+            "Compare with",
+            (NOBODY, *comparable_agents()),
+            key="learn_compare",
+            bind="query-params",
+            persist_state="session",
+            help="An agent that plays the episodes after learning too, without the shield and "
+            "with it, and learns nothing.",
+        )
+    return FurtherSettings(int(episodes), projection, choose, agent)
+
+
+def explain_arms() -> None:
+    """What the ways to learn are."""
+    with st.popover("What they do", icon=":material/help:", type="tertiary"):
+        for arm in ARMS.values():
+            st.markdown(f"**{arm.title}.** {arm.what}")
+        st.caption(
+            "PPO, DQN and SAC are the usual learners. PPO learns from what it has just done. "
+            "DQN, and SAC where actions are continuous, learn from a memory of all they did."
+        )
 
 
 def comparable_agents() -> tuple[str, ...]:

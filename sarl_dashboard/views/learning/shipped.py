@@ -39,10 +39,15 @@ def shipped_studies() -> dict[str, LearningStudy]:
 
 def title_of(study: LearningStudy) -> str:
     """Environment and rules of a study, in a few words."""
-    names = {env_id: label for label, env_id in SHIPPED_SETS.values()}
     rules = study.settings.get("rules")
     by = f", {counted(int(rules['count']), 'rule')}" if isinstance(rules, dict) else ""
-    return f"{names.get(study.env_id, study.env_id)}{by}"
+    return f"{task_of(study)}{by}"
+
+
+def task_of(study: LearningStudy) -> str:
+    """What the task of a study is called."""
+    names = {env_id: label for label, env_id in SHIPPED_SETS.values()}
+    return names.get(study.env_id, study.env_id)
 
 
 def show_shipped() -> None:
@@ -57,19 +62,24 @@ def show_shipped() -> None:
     demonstrations = uncombined_demonstrations()
     env_id = demonstrations.env_id if demonstrations is not None else ""
     fitting = [name for name, study in studies.items() if study.env_id == env_id]
-    name = st.segmented_control(
-        "Study",
-        list(studies),
-        default=(fitting or list(studies))[0],
-        format_func=lambda each: title_of(studies[each]),
-        key=f"study_{fitting[0] if fitting else 'any'}",
-        required=True,
-        label_visibility="collapsed",
-    )
-    if not fitting:
-        st.caption(
-            f"For {escaped(env_id or 'these demonstrations')} no study is shipped; under “Your "
-            "own” you can make one."
+    if not fitting:  # what was learned in another task says nothing of this one
+        tasks = dict.fromkeys(task_of(study) for study in studies.values())
+        st.info(
+            f"For {escaped(env_id or 'these data')} no study is shipped: make one under “Your "
+            f"own”, or choose other data in the sidebar, such as {escaped(' or '.join(tasks))}.",
+            icon=":material/school:",
+        )
+        return
+    name = fitting[0]
+    if len(fitting) > 1:
+        name = st.segmented_control(
+            "Study",
+            fitting,
+            default=name,
+            format_func=lambda each: title_of(studies[each]),
+            key=f"study_{name}",
+            required=True,
+            label_visibility="collapsed",
         )
     study = studies[name]
     show_study(study, "shipped")
