@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.arrays import make_read_only
-from sarl_core.decimals import float32_around, short_decimal
+from sarl_core.decimals import decimal_text, float32_around, short_decimal
 
 FEWEST_DIGITS = 3
 """Of a threshold that is read: a threshold stands between two values, but not just anywhere."""
@@ -97,6 +98,24 @@ class Splits:
         """
         wanted = np.isin(self.thresholds, np.fromiter(thresholds, dtype=np.float64))
         return Splits(self.thresholds[wanted], self.below[wanted], self.above[wanted], self.binary)
+
+    @cached_property
+    def _written(self) -> dict[float, str]:
+        return {}
+
+    def written(self, threshold: float) -> str:
+        """A threshold as it is read, which many rules may ask about.
+
+        Args:
+            threshold: Any number.
+
+        Returns:
+            As "293.42": what `written_threshold` gives, as text.
+        """
+        text = self._written.get(threshold)
+        if text is None:
+            text = self._written[threshold] = decimal_text(written_threshold(threshold, self))
+        return text
 
     def around(self, threshold: float) -> tuple[float, float] | None:
         """The demonstrated values on either side of a threshold.

@@ -24,6 +24,8 @@ def limit_text(threshold: float, feature: Feature, *, beside: Sequence[float] = 
         As "293.42": three significant digits, more where it takes them to part the demonstrated
         states and `beside` as the threshold does; without its unit.
     """
+    if feature.splits is not None and not beside:
+        return feature.splits.written(threshold)
     return decimal_text(written_threshold(threshold, feature.splits, beside=beside))
 
 

@@ -8,6 +8,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, TypeVar
@@ -46,6 +47,9 @@ VERSIONS = (1, 2)
 derived from others, and which actions labels stand for that do not count. A file without all that
 is written as version 1, which is what it was before there was another."""
 _MOST_CONDITIONS = 500_000  # a line for each of their values: a file of 50 MB
+
+
+_JSON = json.JSONEncoder(allow_nan=False, ensure_ascii=False)
 
 
 def write_rules(rule_set: RuleContents, path: Path) -> None:
@@ -116,8 +120,11 @@ def file_parts(rule_set: RuleContents) -> Iterator[str]:
             yield _value(value, 1, indented)
             continue
         start = "["
-        for entry in value:
-            yield f"{start}\n  {_value(entry, 2, indented)}"
+        lines: Iterator[str] = (_value(entry, 2, indented) for entry in value)
+        if key == "rules" and not indented:
+            lines = _rule_lines(rule_set.rules)
+        for line in lines:
+            yield f"{start}\n  {line}"
             start = ","
         yield "[]" if start == "[" else "\n ]"
     yield "\n}\n"
@@ -125,12 +132,23 @@ def file_parts(rule_set: RuleContents) -> Iterator[str]:
 
 def _value(value: Any, depth: int, indented: bool) -> str:
     """A value so deep in the document: with a line for each of what is in it, or on one line."""
-    text = json.dumps(value, allow_nan=False, ensure_ascii=False)
+    text = _JSON.encode(value)
     if indented:
         # As `json` would, which has no fast way to indent; half a pair has no other encoding.
         encoded = text.encode(errors="surrogatepass")
         text = msgspec.json.format(encoded, indent=1).decode(errors="surrogatepass")
     return text.replace("\n", "\n" + " " * depth)  # texts hold none: there it is an escape
+
+
+def _rule_lines(rules: Iterable[Rule]) -> Iterator[str]:
+    """The same of many rules: a query that they share is written once."""
+    written = cache(lambda condition: _JSON.encode(_condition(condition)))
+    for rule in rules:
+        queries = ", ".join(map(written, rule.conditions))
+        # Within a text of JSON no quotation mark stands by itself: this is the key.
+        line = _JSON.encode(rule_document(rule, []))
+        before, _, after = line.partition('"conditions": []')
+        yield f'{before}"conditions": [{queries}]{after}'
 
 
 def _document(rule_set: RuleContents) -> dict[str, Any]:
@@ -216,15 +234,24 @@ def _action(action: LabelledDimension) -> dict[str, Any]:
     }
 
 
-def rule_document(rule: Rule) -> dict[str, Any]:
-    """A rule as the file has it."""
+def _condition(condition: Condition) -> dict[str, Any]:
+    feature, op, threshold = condition
+    return {"feature": feature, "op": op, "threshold": _number(threshold)}
+
+
+def rule_document(rule: Rule, conditions: list[dict[str, Any]] | None = None) -> dict[str, Any]:
+    """A rule as the file has it.
+
+    Args:
+        rule: To write.
+        conditions: Its conditions as the file has them, where they are at hand.
+    """
+    if conditions is None:
+        conditions = list(map(_condition, rule.conditions))
     entry: dict[str, Any] = {
         "id": rule.id,
         "dimension": rule.dimension,
-        "conditions": [
-            {"feature": feature, "op": op, "threshold": _number(threshold)}
-            for feature, op, threshold in rule.conditions
-        ],
+        "conditions": conditions,
         "action": rule.action,
         "support": _number(rule.support),
         "confidence": _number(rule.confidence),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
@@ -184,6 +184,7 @@ class RuleSet(RuleContents, Sequence[Rule]):
         import pandas as pd
 
         features = self.source.features
+        exact = cache(partial(exact_condition, features=features))  # many rules share queries
         return pd.DataFrame(
             {
                 "name": [self.name_of(rule) for rule in self],
@@ -192,9 +193,7 @@ class RuleSet(RuleContents, Sequence[Rule]):
                 "action": [label_text(rule.action, self.actions[rule.dimension]) for rule in self],
                 "rule": [sentence(rule, self, evidence=False) for rule in self],
                 "conditions": [
-                    " and ".join(exact_condition(one, features) for one in rule.conditions)
-                    or "always"
-                    for rule in self
+                    " and ".join(map(exact, rule.conditions)) or "always" for rule in self
                 ],
                 **{
                     column: np.array(

@@ -118,15 +118,17 @@ class Rule:
     @cached_property
     def bounds(self) -> tuple[Bounds, ...]:
         """The conditions with several bounds on one feature made one interval."""
-        by_feature: dict[int, Bounds] = {}
+        lows: dict[int, float] = {}
+        highs: dict[int, float] = {}
         for feature, op, threshold in self.conditions:
-            before = by_feature.get(feature, Bounds(feature, -np.inf, np.inf))
-            by_feature[feature] = (
-                before._replace(high=min(before.high, threshold))
-                if op == "<="
-                else before._replace(low=max(before.low, threshold))
-            )
-        return tuple(by_feature.values())
+            # Each feature stands in both, in the order of its first query.
+            low, high = lows.setdefault(feature, -np.inf), highs.setdefault(feature, np.inf)
+            if op == "<=":
+                if threshold < high:
+                    highs[feature] = threshold
+            elif threshold > low:
+                lows[feature] = threshold
+        return tuple(map(Bounds, lows, lows.values(), highs.values()))
 
     def applies(self, observations: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Whether its conditions hold.

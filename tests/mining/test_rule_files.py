@@ -122,6 +122,18 @@ def test_rules_with_very_many_conditions_stand_on_a_line_each(deep, tmp_path):
     assert rules_digest(deep) != rules_digest(replace(deep, rules=()))
 
 
+def test_a_line_is_what_json_writes_whatever_a_rule_is_called(deep):
+    named = replace(deep.rules[0], id='"conditions": [] \\ \N{DEGREE SIGN}')
+    rules = replace(deep, rules=(named, *deep.rules[1:]))
+    lines = [line for line in rules_to_json(rules).splitlines() if '"conditions"' in line]
+    assert len(lines) == len(rules)
+    for line, rule in zip(lines, rules, strict=True):
+        entry = json.loads(line.strip().rstrip(","))
+        assert line.strip().rstrip(",") == json.dumps(entry, ensure_ascii=False)
+        assert entry["id"] == rule.id
+        assert entry["length"] == len(entry["conditions"]) == rule.length
+
+
 def test_saving_very_many_conditions_takes_little_memory(deep, tmp_path):
     tracemalloc.start()
     try:

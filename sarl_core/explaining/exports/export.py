@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
+from functools import cache, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -320,10 +321,11 @@ def rules_to_csv(rule_set: RuleSet) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(CSV_COLUMNS)
     features = rule_set.source.features
+    exact = cache(partial(exact_condition, features=features))  # many rules share their queries
     for rule in rule_set.rules:
         dimension = rule_set.actions[rule.dimension]
         held_out = rule.held_out
-        conditions = " and ".join(exact_condition(c, features) for c in rule.conditions)
+        conditions = " and ".join(map(exact, rule.conditions))
         writer.writerow(
             (
                 safe_cell(rule.id),
