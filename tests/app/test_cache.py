@@ -58,6 +58,14 @@ def test_what_is_in_a_thing_twice_is_counted_once() -> None:
     assert size_of([whole, whole, (whole,)]) == pytest.approx(MEGABYTE, rel=0.01)
 
 
+def test_what_many_share_is_counted_about_once() -> None:
+    shared = [(float(number),) * 40 for number in range(100)]
+    alone = tuple(shared)
+    together = [tuple(shared) for _ in range(1_000)]
+    lists = sum(sys.getsizeof(one) for one in together)
+    assert size_of(alone) * 10 < lists < size_of(together) < 2 * lists
+
+
 def test_what_was_not_used_for_longest_goes_first() -> None:
     kept = BoundedCache(None, 3 * MEGABYTE)
     for name in "abc":

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
+import numpy as np
 import streamlit as st
+from numpy.typing import NDArray
 
 from sarl_core.explaining.exports.export import rules_to_csv
 from sarl_core.explaining.words.evidence import remedy_text, shortfall_text
 from sarl_core.mining.language import action_text, conditions_text
 from sarl_core.mining.rule_set import RuleSet, rules_to_json
-from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.holding_out import lower_bound, shortfall, with_lower_bound
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download
@@ -23,57 +24,103 @@ from sarl_dashboard.state.data import data_parts, held_out_demonstrations
 from sarl_dashboard.text import in_full
 from sarl_dashboard.views.rules.in_force import InForce
 
+if TYPE_CHECKING:
+    import pyarrow as pa
+
 EVERY = "every action"
+
+
+Places = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class Listed:
-    """The rules of the table.
+    """The R rules of a set, by their places in it, ready to be filtered and ordered.
 
     Attributes:
-        rules: The most support first.
-        table: The same as an Arrow table, which takes no time to send.
-        does: What each says.
-        lower: The lower bound of each.
+        places: The most support first, (R,).
+        place: By id.
+        does: What each says, as a place among `names`, (R,).
+        names: What rules may say.
+        lower: The lower bound of each, (R,).
+        measures: What the table may be ordered by, (R,) each.
     """
 
-    rules: tuple[Rule, ...]
-    table: Any
-    does: tuple[str, ...]
-    lower: tuple[float, ...]
+    places: Places
+    place: Mapping[str, int]
+    does: Places
+    names: tuple[str, ...]
+    lower: NDArray[np.float64]
+    measures: Mapping[str, NDArray[np.float64]]
+
+
+@cached(show_spinner="Listing the rules …")
+def listed_rules(rule_set: RuleSet) -> Listed:
+    """What rules are found by; none of them is written in words for it."""
+    rules = rule_set.rules
+    names: dict[str, int] = {}
+    meant = {
+        (index, label): names.setdefault(action_text(label, dimension), len(names))
+        for index, dimension in enumerate(rule_set.actions)
+        for label in range(dimension.n_labels)
+    }
+    samples = np.array([rule.samples for rule in rules], dtype=np.int64)
+    return Listed(
+        places=np.argsort(-samples, kind="stable"),
+        place={rule.id: place for place, rule in enumerate(rules)},
+        does=np.array([meant[rule.dimension, rule.action] for rule in rules], dtype=np.int64),
+        names=tuple(names),
+        lower=np.array(list(map(lower_bound, rules)), dtype=np.float64),
+        measures={
+            name: np.array([getattr(rule, name) for rule in rules], dtype=np.float64)
+            for name in ("confidence", "lift", "length")
+        },
+    )
 
 
 @cached(show_spinner="Writing the rules in plain language …")
-def listed_rules(rule_set: RuleSet) -> Listed:
-    """All rules, ready to be filtered."""
+def searched_texts(rule_set: RuleSet) -> pa.Array:
+    """What a search looks through, a text a rule in small letters.
+
+    Of very many rules it takes seconds, so it is made when somebody searches.
+    """
     import pyarrow as pa
 
-    rules = tuple(sorted(rule_set.rules, key=lambda rule: -rule.samples))
+    return pa.array(
+        (
+            f"{conditions_text(rule, rule_set)} "
+            f"{action_text(rule.action, rule_set.actions[rule.dimension])} "
+            f"{rule_set.name_of(rule)}".lower()
+            for rule in rule_set.rules
+        ),
+        pa.large_string(),  # together they may be longer than offsets of 32 bits reach
+    )
+
+
+@cached()
+def table_of(rule_set: RuleSet, places: bytes) -> pa.Table:
+    """Some rules as an Arrow table, which takes no time to send.
+
+    Args:
+        rule_set: Of which they are.
+        places: The bytes of their places in it.
+    """
+    import pyarrow as pa
+
+    rules = [rule_set[place] for place in np.frombuffer(places, dtype=np.int64).tolist()]
     names = [f"{rule_set.name_of(rule)}{'' if rule.enabled else ', off'}" for rule in rules]
     table = frame(rules, rule_set, names)
-    return Listed(
-        rules,
-        pa.Table.from_pandas(table, preserve_index=False),
-        tuple(action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules),
-        tuple(map(lower_bound, rules)),
-    )
+    return pa.Table.from_pandas(table, preserve_index=False)
 
 
-def matching(listed: Listed, in_force: InForce) -> list[int]:
+def matching(listed: Listed, in_force: InForce) -> Places:
     """Places of the rules that the search and the choice of action let through."""
     rule_set, compact = in_force.rule_set, in_force.compact
-    names = list(
-        dict.fromkeys(
-            action_text(label, dimension)
-            for dimension in rule_set.actions
-            for label in range(dimension.n_labels)
-        )
-    )
     with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
         words = search_box()
         action = st.selectbox(
             "Action",
-            [EVERY, *names],
+            [EVERY, *listed.names],
             key="action",
             bind="query-params",
             width=220,
@@ -81,27 +128,31 @@ def matching(listed: Listed, in_force: InForce) -> list[int]:
         )
         tried = compact is None and held_out_demonstrations() is not None
         least = lower_bound_choice() if tried else 0.0
-        sure = [place for place, bound in enumerate(listed.lower) if bound >= least]
+        matches = listed.lower >= least
+        sure = int(np.count_nonzero(matches))
         stem = f"rules-{in_force.demonstrations.env_id.replace('/', '-') or 'unnamed'}"
         if compact is not None and not in_force.edits:
             downloads(stem, len(compact.shipped), lambda: compact.shipped)
         else:
-            downloads(
-                stem, len(sure), lambda: with_lower_bound(rule_set, least) if least else rule_set
-            )
-    if len(sure) < len(listed.rules):
-        why_left_out(listed, least)
-    places = sure if action == EVERY else [place for place in sure if listed.does[place] == action]
-    if not words:
-        return places
-    return [place for place in places if has_words(listed, place, rule_set, words)]
+            downloads(stem, sure, lambda: with_lower_bound(rule_set, least) if least else rule_set)
+    if sure < len(rule_set):
+        why_left_out(rule_set, least)
+    if action in listed.names:
+        matches &= listed.does == listed.names.index(action)
+    if words and matches.any():
+        matches &= have_words(rule_set, words)
+    return listed.places[matches[listed.places]]
 
 
-def has_words(listed: Listed, place: int, rule_set: RuleSet, words: tuple[str, ...]) -> bool:
-    """Whether a rule has all words of a search."""
-    rule, does = listed.rules[place], listed.does[place]
-    text = f"{conditions_text(rule, rule_set)} {does} {rule_set.name_of(rule)}".lower()
-    return all(word in text for word in words)
+def have_words(rule_set: RuleSet, words: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Whether each rule has all words of a search, (R,)."""
+    import pyarrow.compute as pc
+
+    texts = searched_texts(rule_set)
+    have = np.ones(len(rule_set), dtype=np.bool_)
+    for word in words:
+        have &= np.asarray(pc.match_substring(texts, word))
+    return have
 
 
 def downloads(stem: str, count: int, make_set: Callable[[], RuleSet]) -> None:
@@ -137,11 +188,11 @@ def lower_bound_choice() -> float:
     return float(least or 0.0)
 
 
-def why_left_out(listed: Listed, least: float) -> None:
+def why_left_out(rule_set: RuleSet, least: float) -> None:
     """Why rules do not reach the lower bound, and where none does, what to do."""
     parts = data_parts()
     assert parts is not None
     assert parts.held_out is not None
-    missing = shortfall(listed.rules, least, parts.held_out.n_episodes)
+    missing = shortfall(rule_set.rules, least, parts.held_out.n_episodes)
     remedy = remedy_text(missing, parts.remaining.n_episodes)
     st.caption(f"{shortfall_text(missing)}." + (f" {in_full(remedy)}" if remedy else ""))

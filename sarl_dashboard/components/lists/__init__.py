@@ -1,0 +1,1 @@
+"""Long lists: a page of them at a time."""
