@@ -156,20 +156,36 @@ def test_odd_data_are_remarked_on() -> None:
     assert ":material/info:" in texts(app)
 
 
-def test_many_features_are_shown_a_few_at_a_time() -> None:
+def test_many_features_are_searched_and_shown_a_page_at_a_time() -> None:
     rng = np.random.default_rng(0)
-    file = npz_bytes(observations=rng.normal(size=(50, 30)), actions=rng.integers(0, 2, 50))
+    file = npz_bytes(observations=rng.normal(size=(50, 300)), actions=rng.integers(0, 2, 50))
     app = upload(open_page("demonstrations"), ("wide.npz", file))
     assert not errors(app)
-    chosen = app.multiselect(key="features")
-    assert len(chosen.value) == 12
-    before = len(app.get("plotly_chart"))
-    chosen.set_value([0, 29]).run()
+
+    def drawn() -> list[str]:
+        titles = [text.value for text in app.markdown]
+        return [title.strip("*") for title in titles if title.startswith("**feature")]
+
+    assert drawn() == [f"feature {place}" for place in range(12)]
+    app.session_state["feature_page"] = 25
+    app.run()
+    assert drawn() == [f"feature {place}" for place in range(288, 300)]
+    app.text_input(key="feature_search").set_value("FEATURE 29 E").run()
     assert not app.exception
-    assert len(app.get("plotly_chart")) == before - 10
-    chosen.set_value([]).run()
+    # Another list is seen from its beginning.
+    matching = [place for place in range(300) if "29" in str(place)]
+    assert drawn() == [f"feature {place}" for place in matching[:12]]
+    assert len(app.dataframe[-1].value) == len(matching) == 13
+    app.text_input(key="feature_search").set_value("no such thing").run()
     assert not app.exception
-    assert "Choose a feature" in texts(app)
+    assert not drawn()
+    assert "No feature has such a name" in texts(app)
+
+
+def test_few_features_are_shown_together() -> None:
+    app = open_page("demonstrations", data="cartpole")
+    assert "feature_search" not in [box.key for box in app.text_input]
+    assert "feature_page" not in app.session_state
 
 
 def test_several_action_dimensions_are_coloured_by_one_of_them() -> None:

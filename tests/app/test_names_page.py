@@ -1,12 +1,15 @@
 from __future__ import annotations
 
 from html import escape
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 from streamlit.testing.v1 import AppTest
 
-from sarl_core import load_demonstrations, mine_rules
+from sarl_core import Demonstrations, load_demonstrations, mine_rules
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.demonstrations.formats import save_demonstrations
 from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_set import rules_to_json
 from tests.app.screens import ROUTER, errors, html, open_page, run_through, texts, upload_rules
@@ -130,3 +133,41 @@ def kept(app: AppTest) -> Any:
     from sarl_dashboard.jobs.replays import replay_cache
 
     return replay_cache().get(app.session_state["_replay"].key)
+
+
+def test_among_many_features_one_is_searched_for_and_named(tmp_path: Path) -> None:
+    states = np.random.default_rng(0).normal(size=(60, 300)).astype(np.float32)
+    names = [f"sensor {place:03d}" for place in range(300)]
+    demonstrations = Demonstrations(
+        states,
+        (states[:, 7] > 0).astype(np.int64),
+        np.zeros(60, dtype=np.int64),
+        feature_names=names,
+    )
+    path = tmp_path / "wide.parquet"
+    save_demonstrations(demonstrations, path)
+    app = open_page("demonstrations", data="upload")
+    app.file_uploader(key="upload_files").set_value([(path.name, path.read_bytes(), "")]).run()
+    app.switch_page("names.py").run()
+    assert len(app.data_editor[0].value) == 300
+    app.text_input(key="name_search").set_value("SENSOR 20").run()
+    matching = [place for place in range(300) if "20" in f"{place:03d}"]
+    assert list(app.data_editor[0].value.index) == matching
+    type_into(app, 0, {matching.index(207): {"Name": "way to the wall", "Unit": "m"}})
+    assert not errors(app)
+    assert app.data_editor[0].value["Name"].loc[207] == "sensor 207"  # it is told as a change
+    app.text_input(key="name_search").set_value("").run()
+    whole = app.data_editor[0].value
+    assert whole["Name"].loc[207] == "way to the wall"
+    assert whole["Unit"].loc[207] == "m"
+    assert whole["Name"].drop(index=207).tolist() == names[:207] + names[208:]
+    app.text_input(key="name_search").set_value("wall").run()
+    assert list(app.data_editor[0].value.index) == [207]
+    app.switch_page("demonstrations.py").run()
+    assert "way to the wall" in list(app.dataframe[-1].value["Feature"])
+
+
+def test_few_features_are_not_searched() -> None:
+    assert not [
+        box for box in open_page("names", data="cartpole").text_input if box.key == "name_search"
+    ]

@@ -15,14 +15,19 @@ from sarl_dashboard.components.distributions import (
     show_distribution,
     show_legend,
 )
+from sarl_dashboard.components.lists.feature_search import searched
+from sarl_dashboard.components.lists.pages import follow, number_of_pages, page_choice
 
-AT_FIRST, MOST = 12, 48  # figures
+PAGE_FIGURES = 12
+SEARCH, PAGE = "feature_search", "feature_page"
 
 
 def show_features(
     demonstrations: Demonstrations, rows: tuple[FeatureRow, ...], divider: int
 ) -> None:
-    """The distribution of features, coloured by the action, and a table of all.
+    """The distribution of features, coloured by the action, and a table of them.
+
+    Of many features those that are searched for are shown, a page of figures at a time.
 
     Args:
         demonstrations: N pairs with d features.
@@ -41,30 +46,22 @@ def show_features(
             format_func=lambda index: dimensions[index].name,
             bind="query-params",
         )
-    features = list(range(len(names)))
-    if len(names) > AT_FIRST:
-        features = st.multiselect(
-            "Features to show",
-            range(len(names)),
-            default=list(range(AT_FIRST)),
-            format_func=lambda index: names[index],
-            key="features",
-            bind="query-params",
-            max_selections=MOST,
-        )
+    named = searched(names, SEARCH) if len(names) > PAGE_FIGURES else list(range(len(names)))
     show_legend(dimensions[by])
-    if not features:
-        st.caption("Choose a feature above to see how it is distributed.")
-    pictures = distributions(demonstrations, divider, by, tuple(features))
-    with st.grid(4, min_column_width=220, gap="small") as grid:
+    if not named:
+        st.caption("No feature has such a name; clear the search to see all.")
+    pages = number_of_pages(len(named), PAGE_FIGURES)
+    follow(PAGE, tuple(named), None, page=0, pages=pages)
+    figures = st.container()
+    # Which page it is has to be known before the figures, which stand above the choice.
+    first = page_choice(PAGE, pages) * PAGE_FIGURES
+    features = named[first : first + PAGE_FIGURES]
+    with figures, st.grid(4, min_column_width=220, gap="small") as grid:
+        pictures = distributions(demonstrations, divider, by, tuple(features))
         for index, picture in zip(features, pictures, strict=True):
             with grid.cell():
                 show_distribution(picture, f"feature_{index}")
-    numbers = [
-        row
-        for row, feature in zip(rows, demonstrations.features, strict=True)
-        if feature.indicator is None
-    ]
+    numbers = [rows[place] for place in named if demonstrations.features[place].indicator is None]
     words = [
         (column, word, share)
         for column, shares in word_shares(demonstrations).items()

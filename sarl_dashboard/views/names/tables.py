@@ -10,12 +10,15 @@ from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import Names, names_of
 from sarl_core.mining.language import sentence
+from sarl_dashboard.components.lists.feature_search import searched, with_words
 from sarl_dashboard.state import given_names
 from sarl_dashboard.state.mined import grown_trees, largest_rules
 from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
 from sarl_dashboard.text import escaped
 
 FEATURES, ACTIONS, LABELS = "Features", "Actions", "Labels"
+SEARCH = "name_search"
+_MANY = 24  # features, among which one searches
 
 
 def columns_of(table: str, names: Names, raw: Demonstrations) -> dict[str, list[Any]]:
@@ -74,7 +77,27 @@ def with_typed(table: str, names: Names, rows: dict[int, dict[str, Any]]) -> Nam
 
 def key_of(table: str, raw: Demonstrations) -> str:
     """The widget's key; another after a reset, so that it forgets what was typed."""
-    return f"names_{table}_{raw.digest[:8]}_{st.session_state.get('_names_reset', 0)}"
+    rows = "" if table != FEATURES else "_".join(_words(raw))
+    return f"names_{table}_{raw.digest[:8]}_{st.session_state.get('_names_reset', 0)}{rows}"
+
+
+def _words(raw: Demonstrations) -> list[str]:
+    """What is searched for among many features."""
+    text = st.session_state.get(SEARCH) or st.query_params.get(SEARCH) or ""
+    return str(text).lower().split() if len(raw.observed) > _MANY else []
+
+
+def rows_of(table: str, raw: Demonstrations, began: Names) -> list[int] | None:
+    """The rows of a table that are shown; None for all.
+
+    What is searched for is one of the names that the table began with, or that came with the data:
+    a row does not go while it is being renamed.
+    """
+    words = _words(raw)
+    if table != FEATURES or not words:
+        return None
+    both = [" ".join(pair) for pair in zip(began.features, names_of(raw).features, strict=True)]
+    return with_words(both, " ".join(words))
 
 
 def begin(table: str, raw: Demonstrations) -> Names:
@@ -92,7 +115,9 @@ def take(table: str, raw: Demonstrations) -> None:
     key, begun = key_of(table, raw), st.session_state.get("_names_begun", {})
     if key not in st.session_state or key not in begun:
         return
-    rows = st.session_state[key]["edited_rows"]
+    rows, places = st.session_state[key]["edited_rows"], rows_of(table, raw, begun[key])
+    if places is not None:
+        rows = {places[row]: typed for row, typed in rows.items()}
     typed = with_typed(table, begun[key], rows)
     parts: dict[str, dict[str, Any]] = {
         FEATURES: {"features": typed.features, "units": typed.units},
@@ -106,8 +131,13 @@ def editor(table: str, raw: Demonstrations) -> None:
     """One table in which names are typed."""
     import pandas as pd
 
+    if table == FEATURES and len(raw.observed) > _MANY:
+        searched(names_of(raw).features, SEARCH)
     began = begin(table, raw)
     frame = pd.DataFrame(columns_of(table, began, raw))
+    places = rows_of(table, raw, began)
+    if places is not None:
+        frame = frame.iloc[places]
     fixed = [str(name) for name in frame if name not in ("Name", "Unit")]
     if table == LABELS and len(raw.action_dimensions) == 1:
         frame = frame.drop(columns="Of")
