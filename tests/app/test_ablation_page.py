@@ -56,7 +56,6 @@ def test_called_off_it_says_so() -> None:
         ({"agent": "own file"}, "policy has been uploaded"),
         ({"set": "own file"}, "rule file that was chosen was not kept"),
         ({"support": "1", "confidence": "1"}, "no rule that could be taken out"),
-        ({"data": "upload"}, "demonstrations do not say"),
     ],
 )
 def test_what_cannot_be_run_is_said_in_a_sentence(query: dict[str, str], fragment: str) -> None:

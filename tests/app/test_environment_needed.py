@@ -95,3 +95,11 @@ def test_with_an_environment_nothing_is_said() -> None:
         app = open_page(page, data="cartpole")
         assert "environment, so " not in texts(app)
         assert has(app, widget)
+
+
+@pytest.mark.parametrize("page", FORM)
+def test_without_demonstrations_one_is_sent_to_them(page: str) -> None:
+    app = open_page(page, data="upload")
+    assert not errors(app)
+    assert "Nothing has been uploaded in this session" in texts(app)
+    assert not app.main.number_input

@@ -186,7 +186,6 @@ def test_twenty_episodes_are_compared() -> None:
         ({"env": "Nowhere-v9"}, "Nowhere-v9"),
         ({"env": "MountainCar-v0", "agent": "expert", "rules": "none"}, "no shipped expert"),
         ({"env": "Pendulum-v1"}, "rules"),
-        ({"data": "upload"}, "demonstrations do not say"),
         ({"data": "upload", "env": "CartPole-v1"}, "no demonstrations to mine"),
         ({"agent": "own file"}, "policy has been uploaded"),
         ({"set": "own file"}, "rule file that was chosen was not kept"),
