@@ -157,6 +157,7 @@ def editor(table: str, raw: Demonstrations) -> None:
             "Least": column.TextColumn(width=78),
             "Largest": column.TextColumn(width=82),
             "Action": column.NumberColumn(format="%d", width="small"),
+            "_index": column.Column(disabled=True),
         },
     )
 

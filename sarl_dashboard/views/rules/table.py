@@ -160,7 +160,8 @@ def rule_rows(places: Places, in_force: InForce, chosen: Rule, row: int | None) 
     part = places[first : first + PAGE_ROWS]
     at = row - first if row is not None and 0 <= row - first < len(part) else None
     with table:
-        page_rows(part, in_force, at)
+        # A table a page: what is chosen in one is not taken for a row of another.
+        page_rows(part, in_force, at, f"rule_table_{page}" if page else "rule_table")
         where, sort = "", "sort"
         if pages > 1:
             where = f"Rows {first + 1:,} to {first + len(part):,}. "
@@ -172,9 +173,9 @@ def rule_rows(places: Places, in_force: InForce, chosen: Rule, row: int | None) 
         )
 
 
-def page_rows(places: Places, in_force: InForce, row: int | None) -> None:
+def page_rows(places: Places, in_force: InForce, row: int | None, key: str) -> None:
     """Some rows of the table, the chosen one selected."""
-    select_row(row)
+    select_row(row, key)
     rule_set = in_force.rule_set
     high = row_height(rule_set)
     st.dataframe(
@@ -183,8 +184,8 @@ def page_rows(places: Places, in_force: InForce, row: int | None) -> None:
         column_config=column_config(rule_set),
         height=table_height(len(places), TABLE_ROWS, high),
         row_height=high,
-        key="rule_table",
-        on_select=lambda: pick(rule_set, places),
+        key=key,
+        on_select=lambda: pick(rule_set, places, key),
         selection_mode="single-row",
         selection_default={"selection": {"rows": [] if row is None else [row]}},
         alt="All rules in force",
@@ -199,16 +200,16 @@ def count_text(matching: int, in_force: InForce) -> str:
     return f"{matching:,} of {count.lower()} match." if matching < total else f"{count}."
 
 
-def pick(rule_set: RuleSet, places: Places) -> None:
+def pick(rule_set: RuleSet, places: Places, key: str) -> None:
     """Choose the rule whose row was selected."""
-    rows = st.session_state["rule_table"]["selection"]["rows"]
+    rows = st.session_state[key]["selection"]["rows"]
     if rows and rows[0] < len(places):
         set_url_choice("rule", rule_set[int(places[rows[0]])].id)
 
 
-def select_row(row: int | None) -> None:
+def select_row(row: int | None, key: str) -> None:
     """Select a row of the table, or none, before it is drawn; it keeps a choice of its own."""
-    table = st.session_state.get("rule_table")
+    table = st.session_state.get(key)
     rows = [] if row is None else [row]
     if table is not None and list(table["selection"]["rows"]) != rows:
-        st.session_state["rule_table"] = {"selection": {"rows": rows}}
+        st.session_state[key] = {"selection": {"rows": rows}}
