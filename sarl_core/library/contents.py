@@ -82,6 +82,7 @@ def add_rules(
     parent: str = "",
     came_from: Sequence[str] = (),
     edits: Sequence[Edit] = (),
+    command: str = "",
     shared: bool = False,
 ) -> Item:
     """Keep a rule set, as it is written into a rule file.
@@ -94,6 +95,7 @@ def add_rules(
         parent: Id of the version that it was made from.
         came_from: Ids of the demonstrations that it was mined from.
         edits: That were made on what was mined; they are part of the rules already.
+        command: That makes it again.
         shared: Whether it stands in everybody's list.
 
     Raises:
@@ -116,6 +118,7 @@ def add_rules(
             digest=rules_digest(rule_set),
             parent=parent,
             came_from=came_from,
+            command=command,
             details=about,
             shared=shared,
         )

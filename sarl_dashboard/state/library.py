@@ -159,6 +159,7 @@ def keep(demonstrations: Demonstrations, name: str) -> str:
     ]
     item = known[0] if known else add_demonstrations(opened, demonstrations, name, author=author())
     _ids()[digest] = item.id
+    _say_room(opened)
     return item.id
 
 
@@ -300,6 +301,7 @@ def keep_rules(
     *,
     edits: Sequence[Edit] = (),
     parent: str = "",
+    command: str = "",
 ) -> Item:
     """Keep a rule set as it stands, as a new version.
 
@@ -310,6 +312,7 @@ def keep_rules(
         edits: That were made on the rules before.
         parent: Id of the version that it was made from; the one that was kept before it in this
             visit where not given.
+        command: That makes the rules again.
 
     Returns:
         What is kept; where its author keeps the same already, that.
@@ -331,6 +334,14 @@ def keep_rules(
         parent=parent or before.get(demonstrations.digest, ""),
         came_from=[raw] if raw else [],
         edits=edits,
+        command=command,
     )
     before[demonstrations.digest] = item.id
+    _say_room(opened)
     return item
+
+
+def _say_room(opened: Library) -> None:
+    """Say that a quota is near, before it is reached."""
+    if warning := opened.usage(author()).warning:
+        st.toast(f"{warning[0].upper()}{warning[1:]}.", icon=":material/database:")

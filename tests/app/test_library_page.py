@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 import shutil
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,9 +14,10 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations
 from sarl_core.errors import InputError
-from sarl_core.library import Library
+from sarl_core.library import Library, Quota
 from sarl_core.library.contents import annotated_file, rules_of
 from sarl_core.library.items import new_id
+from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_dashboard.state import library as state
 from tests.app.screens import chosen_rules, errors, metrics, open_page, texts
 
@@ -248,3 +252,31 @@ def test_what_is_kept_for_a_link_alone_opens_and_offers_nothing() -> None:
     page = open_page("library", item=identifier)
     assert not page.exception
     assert "Kept for a link" in texts(page)
+
+
+@pytest.mark.parametrize("merged", ["true", "false"])
+def test_the_commands_of_kept_rules_make_them_again(
+    merged: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = (DATA / "pendulum.parquet").read_bytes()
+    identifier = upload(open_page("demonstrations"), content, "swing.parquet")
+    app = open_page("export", data=identifier, divider="4", support="0.01", merged=merged)
+    app.button(key="keep_rules").click().run()
+    with Library() as library:
+        (item,) = library.items("Ada", kind="rules")
+    monkeypatch.setenv("PYTHONPATH", str(DATA.parents[1]))
+    for line in item.command.splitlines():
+        subprocess.run([sys.executable, *shlex.split(line)[1:]], check=True, cwd=tmp_path)
+    assert rules_digest(RuleSet.load(tmp_path / "exported.json")) == item.digest
+
+
+def test_that_a_quota_is_near_is_told_where_something_is_kept(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    app = open_page("demonstrations")
+    upload(app)
+    assert not app.toast
+    used = state.library().usage("Ada").author
+    monkeypatch.setattr(state.library(), "quota", Quota(author=round(2.05 * used)))
+    upload(app, ROWS.replace(b"0.25", b"0.75"), "crane_2.csv")
+    assert any("remove what is no longer needed" in toast.value for toast in app.toast)

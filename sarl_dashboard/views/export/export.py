@@ -11,6 +11,7 @@ from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state import in_force
 from sarl_dashboard.state.data import all_demonstrations
 from sarl_dashboard.text import in_full
+from sarl_dashboard.views.export.command import command_of
 from sarl_dashboard.views.export.files import prepared_for, show_file
 from sarl_dashboard.views.export.matrix import show_matrix
 from sarl_dashboard.views.export.rounding import show_rounding
@@ -43,4 +44,8 @@ def show_export(demonstrations: Demonstrations) -> None:
         show_matrix(prepared.rule_set, chosen.stem, demonstrations)
     else:
         show_file(prepared.rule_set, chosen)
-        keep_rules_form(prepared.rule_set, in_force=chosen.rules == in_force.kind())
+        keep_rules_form(
+            prepared.rule_set,
+            in_force=chosen.rules == in_force.kind(),
+            command=command_of(chosen, demonstrations),
+        )
