@@ -54,6 +54,7 @@ def add_result(
     *,
     author: str,
     about: Sequence[str] = (),
+    address: str = "",
 ) -> Item:
     """Keep a file that work left: a table, an answer, a report, a picture, a certificate.
 
@@ -63,6 +64,7 @@ def add_result(
         name: What it is called; as the file is where not given.
         author: Whose it is.
         about: Ids of what it is about.
+        address: Of the page of the dashboard that shows it, as "measure?data=cartpole".
 
     Returns:
         What is kept.
@@ -90,7 +92,7 @@ def add_result(
         author=author,
         digest=digest,
         came_from=standing_ids(library, about),
-        details={"file_name": path.name},
+        details={"file_name": path.name, **({"address": address} if address else {})},
     )
 
 

@@ -1,6 +1,9 @@
-"""Keeping a rule set in the library, from the pages where one is made."""
+"""Keeping rule sets and results in the library, from the pages where they are made."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from urllib.parse import urlencode, urlsplit
 
 import streamlit as st
 
@@ -10,7 +13,7 @@ from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.state import edits, library, rule_base
 from sarl_dashboard.state import in_force as rules_in_force
-from sarl_dashboard.state.data import raw_demonstrations
+from sarl_dashboard.state.data import chosen_dataset, raw_demonstrations
 from sarl_dashboard.text import refuse
 
 
@@ -51,3 +54,45 @@ def _history() -> tuple[tuple[Edit, ...], str]:
     made = edits.history(base).edits if rules_in_force.is_edited() else ()
     name = rule_base.base_name()
     return made, name if rule_base.is_in_library(name) else ""
+
+
+def keep_result_button(
+    content: str | bytes | Callable[[], str | bytes], file: str, *, key: str
+) -> None:
+    """A button that keeps a result, with the address that opens it as it is.
+
+    Args:
+        content: Of the file, or what makes it.
+        file: Its name.
+        key: Of the button.
+    """
+    if not st.button(
+        "Keep",
+        icon=":material/inventory_2:",
+        key=key,
+        help="In the library, with the address of this page as it is now",
+    ):
+        return
+    made = content() if callable(content) else content
+    names = (chosen_dataset(), rule_base.base_name())
+    about = [name for name in names if library.is_id(name)]
+    try:
+        item = library.keep_result(
+            made.encode() if isinstance(made, str) else made, file, about, _address()
+        )
+    except SarlError as error:
+        refuse(error)
+        return
+    st.page_link(
+        "library.py",
+        label=f"Kept: {item.name}",
+        icon=":material/check:",
+        query_params={"item": item.id},
+    )
+
+
+def _address() -> str:
+    """Of this page, from where the dashboard begins."""
+    page = urlsplit(st.context.url or "").path.rsplit("/", 1)[-1]
+    asked = {name: st.query_params.get_all(name) for name in st.query_params}
+    return f"{page}?{urlencode(asked, doseq=True)}" if page else ""

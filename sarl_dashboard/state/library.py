@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from pathlib import Path
 from threading import Lock
 from typing import Any, cast
 
@@ -22,8 +24,10 @@ from sarl_core.library.contents import (
     file_of,
     rules_of,
 )
+from sarl_core.library.file_store import content_digest
 from sarl_core.library.items import as_id
 from sarl_core.library.place import LibraryPlace, place_of, usual_author
+from sarl_core.library.results import add_result
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.editing.edits import Edit
 from sarl_core.mining.rule_set import RuleSet, rules_digest
@@ -337,6 +341,31 @@ def keep_rules(
         command=command,
     )
     before[demonstrations.digest] = item.id
+    _say_room(opened)
+    return item
+
+
+def keep_result(content: bytes, file: str, about: Sequence[str], address: str) -> Item:
+    """Keep what work left; where its author keeps the same, that is it.
+
+    Args:
+        content: Of the file.
+        file: Its name.
+        about: Ids of what it is about.
+        address: Of the page that shows it.
+
+    Raises:
+        SarlError: If it cannot be kept.
+    """
+    opened = library()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / file
+        path.write_bytes(content)
+        digest, _ = content_digest(path)
+        for known in opened.with_digest(digest, kind="result"):
+            if known.author == author() and known.details.get("address", "") == address:
+                return known
+        item = add_result(opened, path, author=author(), about=about, address=address)
     _say_room(opened)
     return item
 

@@ -23,6 +23,7 @@ from sarl_core.mining.language import sentence
 from sarl_core.studies.ablation import Ablation
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.safety import safety_tiles
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.components.tables import action_column
@@ -121,12 +122,9 @@ def table(ablation: Ablation, choice: AblationChoice) -> None:
             width="content",
         )
         name = str(choice.wanted.row.env_id).rsplit("/", 1)[-1].rsplit(":", 1)[-1]
-        download(
-            "Download CSV",
-            lambda: csv(ablation),
-            f"ablation-{name}-{choice.wanted.row.seed}.csv",
-            key="ablation_csv",
-        )
+        file = f"ablation-{name}-{choice.wanted.row.seed}.csv"
+        download("Download CSV", lambda: csv(ablation), file, key="ablation_csv")
+        keep_result_button(lambda: csv(ablation), file, key="keep_ablation")
     picked = chosen["selection"]["rows"]
     if picked and picked[0] < rows:
         rule_set = ablation.shield.rule_set

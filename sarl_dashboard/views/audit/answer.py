@@ -22,6 +22,7 @@ from sarl_core.explaining.words.audit import audit_facts, comparison_text, drift
 from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.language import share_text
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.state.sign_off import sign_off_here
 from sarl_dashboard.text import escaped
@@ -81,22 +82,22 @@ def _downloads(logs: Logs, sign_off: SignOff | None) -> None:
     stem = f"audit-{PurePath(logs.name).stem}"
     held = logs.first
     with st.container(horizontal=True, gap="small"):
+        page = partial(_page, logs, sign_off)
         download(
             "Report",
-            lambda: str(
-                audit_html(
-                    held,
-                    title=f"Audit of {logs.name}",
-                    comparison=logs.comparison,
-                    sign_off=sign_off,
-                )
-            ),
+            page,
             f"{stem}.html",
             key="audit_html",
             meaning="One page that opens by itself",
         )
         download("JSON", partial(_json, logs, sign_off), f"{stem}.json", key="audit_json")
         download("Steps as CSV", partial(_steps, held), f"{stem}.csv", key="audit_csv")
+        keep_result_button(page, f"{stem}.html", key="keep_audit")
+
+
+def _page(logs: Logs, sign_off: SignOff | None) -> str:
+    title = f"Audit of {logs.name}"
+    return str(audit_html(logs.first, title=title, comparison=logs.comparison, sign_off=sign_off))
 
 
 def _json(logs: Logs, sign_off: SignOff | None) -> str:

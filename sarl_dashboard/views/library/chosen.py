@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from contextlib import suppress
 from functools import partial
@@ -24,6 +25,9 @@ from sarl_dashboard.text import escaped, file_name
 from sarl_dashboard.views.library.contents import show_content
 from sarl_dashboard.views.library.listing import KINDS, about, size_text
 from sarl_dashboard.views.library.notes import show_notes, show_results, show_sources
+
+# Of a page here: what came from elsewhere leads nowhere else.
+_ADDRESS = re.compile(r"[a-z_]+\?[\w%=&+.,|~*-]*")
 
 
 def show_chosen(opened: Library, item: Item, author: str) -> None:
@@ -60,6 +64,11 @@ def show_chosen(opened: Library, item: Item, author: str) -> None:
             note = f": {escaped(approval.note)}" if approval.note else ""
             st.markdown(f":material/verified: Approved by **{escaped(approval.author)}**{note}")
         show_content(opened, item)
+        address = str(item.details.get("address", ""))
+        if _ADDRESS.fullmatch(address):
+            st.link_button(
+                "Open it where it was made", f"./{address}", icon=":material/open_in_new:"
+            )
         show_sources(opened, item)
         _buttons(opened, item, author, own=own)
         st.caption(f"On the command line: `library:{item.id}`")

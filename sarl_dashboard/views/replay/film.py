@@ -7,6 +7,7 @@ from functools import partial
 import streamlit as st
 
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.settings import no_boxes_notice, notes_notice
 from sarl_dashboard.jobs.replays import ReplayPair, movie
 from sarl_dashboard.state.agents import FRESH_SEED
@@ -52,6 +53,7 @@ def film(replay: ReplayPair) -> None:
     with st.container(horizontal=True):
         download("Download GIF", replay.film.gif(), f"{name}.gif", key="gif")
         download("Download MP4", partial(movie, replay.film), f"{name}.mp4", key="mp4")
+        keep_result_button(replay.film.gif(), f"{name}.gif", key="keep_replay")
 
 
 def pick_in_film() -> None:

@@ -10,6 +10,7 @@ from sarl_core.explaining.report.report import Report
 from sarl_core.explaining.words.sign_off import sign_off_text
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.jobs.report import ReportOrder, report_cache, reporting
@@ -63,6 +64,7 @@ def show(report: Report, name: str) -> None:
         st.info(f"The report has no pictures: {escaped(report.without)}.", icon=":material/info:")
     with st.container(horizontal=True, vertical_alignment="center"):
         download("Download the report", content, f"report-{name}.html", key="report_file")
+        keep_result_button(content, f"report-{name}.html", key="keep_report")
         st.caption(
             f"One HTML file of {len(content) / 1e6:.1f} MB with "
             f"{counted(report.pictures, 'picture')}. It opens without a network, in any browser, "

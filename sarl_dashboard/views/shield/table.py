@@ -15,6 +15,7 @@ from sarl_core.studies.comparison import Comparison
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.flips import flips_rate, flips_title, pace_of_played
+from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.run_bar import episodes_bar, watched
 from sarl_dashboard.components.safety import freedom_cell, safety_column_config, safety_columns
 from sarl_dashboard.jobs.episodes import COMPARISON, known
@@ -105,12 +106,10 @@ def show(finished: Finished, *, at_work: bool) -> None:
     )
     if not at_work:
         name = env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
-        download(
-            "Download CSV",
-            lambda: csv(comparison),
-            f"comparison-{name}-{seed}.csv",
-            key="comparison_csv",
-        )
+        with st.container(horizontal=True):
+            file = f"comparison-{name}-{seed}.csv"
+            download("Download CSV", lambda: csv(comparison), file, key="comparison_csv")
+            keep_result_button(lambda: csv(comparison), file, key="keep_comparison")
 
 
 def verdicts(finished: Finished) -> list[str]:
