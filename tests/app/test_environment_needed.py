@@ -103,3 +103,9 @@ def test_without_demonstrations_one_is_sent_to_them(page: str) -> None:
     assert not errors(app)
     assert "Nothing has been uploaded in this session" in texts(app)
     assert not app.main.number_input
+
+
+def test_without_demonstrations_nobody_learns() -> None:
+    app = open_page("learning", data="upload", learn_view="Your own")
+    assert not errors(app)
+    assert "Nothing has been uploaded in this session" in texts(app)

@@ -295,7 +295,6 @@ REAL = subprocess.Popen
         ((), {"set": "own file"}, "rule file that was chosen was not kept"),
         (("mask",), {"data": "pendulum"}, "continuous"),
         (("none",), {"data": "pendulum", "learn_choose": "failures first"}, "chosen by failures"),
-        ((), {"data": "upload"}, "demonstrations do not say"),
     ],
 )
 def test_what_cannot_be_learned_is_said_in_a_sentence(
