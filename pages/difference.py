@@ -8,7 +8,7 @@ from sarl_dashboard.views.difference.comparison import comparison
 
 st.title("Compare")
 st.caption(
-    "Two to five rule sets side by side: which rules differ, and on how many of the same states they "
-    "decide differently."
+    "Two to five rule sets side by side: which rules differ, and on how many of the same states "
+    "they decide differently."
 )
 comparison()
