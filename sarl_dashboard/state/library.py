@@ -273,14 +273,14 @@ def _ids() -> dict[str, str]:
 
 
 def keep_rule_file(rule_set: RuleSet, name: str) -> Item:
-    """Keep the rules of an uploaded file; where its author keeps the same, that is it.
+    """Keep the rules of an uploaded file; where its author keeps the same of that name, that is it.
 
     Raises:
         SarlError: If they cannot be kept.
     """
     opened = library()
     for known in opened.with_digest(rules_digest(rule_set), kind="rules"):
-        if known.author == author():
+        if (known.author, known.name) == (author(), name):
             return known
     return add_rules(opened, rule_set, name, author=author())
 
