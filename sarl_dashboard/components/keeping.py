@@ -17,13 +17,15 @@ from sarl_dashboard.state.data import chosen_dataset, raw_demonstrations
 from sarl_dashboard.text import refuse
 
 
-def keep_rules_form(rule_set: RuleSet, *, in_force: bool, command: str = "") -> None:
+def keep_rules_form(
+    rule_set: RuleSet, *, in_force: bool, command: Callable[[], str] = lambda: ""
+) -> None:
     """A name and a button; once kept, where it is.
 
     Args:
         rule_set: As it stands on the page.
         in_force: Whether these are the rules in force, whose edits and parent are known.
-        command: That makes them again.
+        command: Says what makes them again, when they are kept.
     """
     raw = raw_demonstrations()
     if raw is None:
@@ -36,7 +38,7 @@ def keep_rules_form(rule_set: RuleSet, *, in_force: bool, command: str = "") -> 
         return
     try:
         made, parent = _history() if in_force else ((), "")
-        item = library.keep_rules(rule_set, name, raw, edits=made, parent=parent, command=command)
+        item = library.keep_rules(rule_set, name, raw, edits=made, parent=parent, command=command())
     except SarlError as error:
         refuse(error)
         return

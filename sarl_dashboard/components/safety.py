@@ -12,7 +12,7 @@ from sarl_core.environments.failures import no_failures_text
 from sarl_core.mining.language import share_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.failures import rate_text, safety_cells, safety_facts
-from sarl_dashboard.components.journey.words import word_help
+from sarl_dashboard.components.journey.words import with_words, word_help
 
 _ALWAYS = "Failures"  # a typical return hides them
 
@@ -47,7 +47,7 @@ class Tile:
             delta_arrow="off",
             border=True,
             height="stretch",
-            help=self.hint,
+            help=with_words(self.hint),
         )
 
 

@@ -10,6 +10,7 @@ import streamlit as st
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import in_force
 from sarl_dashboard.state.agents import FRESH_SEED, PROJECTIONS, PolicyFile, policy_upload
 from sarl_dashboard.state.environments import AS_DEMONSTRATED, continuous, usual_environments
@@ -78,8 +79,9 @@ def environment_choice() -> str | None:
         key="env",
         bind="query-params",
         accept_new_options=True,
-        help="That of the demonstrations, or type any id that Gymnasium knows, such as "
-        "CartPole-v1.",
+        help=with_words(
+            "That of the demonstrations, or type any id that Gymnasium knows, such as CartPole-v1."
+        ),
     )
 
 
@@ -127,7 +129,7 @@ def rule_set_choice(
         bind="query-params",
         width=width,
         persist_state=persist_state,
-        help=f"{about} {rule_sets_help(offered)}".strip(),
+        help=with_words(f"{about} {rule_sets_help(offered)}".strip()),
     )
     return in_force.kind() if choice in (None, IN_FORCE) else choice
 
@@ -140,9 +142,11 @@ def projection_choice(width: Width = "stretch") -> Projection:
         key="projection",
         bind="query-params",
         width=width,
-        help="What a continuous action that breaks a rule becomes. Centre: the middle of the "
-        "rule's interval. Clip: the nearest value in it. Expert: what the expert typically "
-        "did there.",
+        help=with_words(
+            "What a continuous action that breaks a rule becomes. Centre: the middle of the "
+            "rule's interval. Clip: the nearest value in it. Expert: what the expert typically "
+            "did there."
+        ),
     )
 
 
@@ -154,9 +158,11 @@ def outside_choice(width: Width = "stretch") -> Outside:
         key="outside",
         bind="query-params",
         width=width,
-        help="What a rule does in a state beyond the least and largest values seen where it "
-        "applies. Act: it changes the action all the same, and the step is marked. Abstain: "
-        "it leaves the action to the agent.",
+        help=with_words(
+            "What a rule does in a state beyond the least and largest values seen where it "
+            "applies. Act: it changes the action all the same, and the step is marked. Abstain: "
+            "it leaves the action to the agent."
+        ),
     )
 
 

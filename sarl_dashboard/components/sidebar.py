@@ -13,6 +13,7 @@ from sarl_core.errors import SarlError
 from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rules import FILTERED, Thresholds
 from sarl_dashboard.components.hold_out import parting_lines
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import combining, data_words, in_force, rule_base
 from sarl_dashboard.state.data import (
     all_demonstrations,
@@ -104,8 +105,10 @@ def _rules_choice() -> None:
         format_func=lambda option: labels.get(option, "A rule file …"),
         key="_rules_choice",
         on_change=_choose_rules,
-        help="In force on every page, and in every link to one. What was edited is among them, "
-        "and what you keep in the Library.",
+        help=with_words(
+            "In force on every page, and in every link to one. What was edited is among them, "
+            "and what you keep in the Library."
+        ),
     )
     if st.session_state["_rules_choice"] == _FILE:
         st.file_uploader("Rule file (.json)", key="rule_file", on_change=_take_file)

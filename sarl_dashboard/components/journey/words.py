@@ -23,7 +23,12 @@ def word_help(word: str, more: str = "") -> str:
     Returns:
         What it means, and the way to all words.
     """
-    return " ".join(part for part in (meaning_of(word), more, _ALL) if part)
+    return with_words(" ".join(part for part in (meaning_of(word), more) if part))
+
+
+def with_words(help_text: str) -> str:
+    """What stands behind any other "?", and the way to all words."""
+    return f"{help_text} {_ALL}"
 
 
 def show_words(columns: int) -> None:

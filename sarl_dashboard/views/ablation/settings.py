@@ -11,6 +11,7 @@ from sarl_core.rollouts.player import check_environment
 from sarl_core.shielding.shield import Shield
 from sarl_core.studies.ablation import MOST_RULES
 from sarl_core.studies.ablation_run import LEAST_EPISODES
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import (
     environment_choice,
     no_boxes_notice,
@@ -70,8 +71,10 @@ def settings() -> AblationChoice:
                 offered_agents(),
                 key="agent",
                 bind="query-params",
-                help="Whom the rules hold. With the novice, which acts at random, they have the "
-                "most to do.",
+                help=with_words(
+                    "Whom the rules hold. With the novice, which acts at random, they have the "
+                    "most to do."
+                ),
             )
             rules = rule_set_choice("rules")
             most = st.number_input(
@@ -81,7 +84,7 @@ def settings() -> AblationChoice:
                 25,
                 key="most_rules",
                 bind="query-params",
-                help="At most so many: those that change the most actions.",
+                help=with_words("At most so many: those that change the most actions."),
             )
             episodes = st.number_input(
                 "Episodes",
@@ -90,8 +93,10 @@ def settings() -> AblationChoice:
                 50,
                 key="ablation_episodes",
                 bind="query-params",
-                help="With every rule taken out, and with none. More of them show smaller "
-                "differences.",
+                help=with_words(
+                    "With every rule taken out, and with none. More of them show smaller "
+                    "differences."
+                ),
             )
             seed = st.number_input(
                 "First seed",
@@ -100,8 +105,10 @@ def settings() -> AblationChoice:
                 FRESH_SEED,
                 key="first_seed",
                 bind="query-params",
-                help="The episodes start from this seed, the next one, and so on, the same with "
-                "every rule taken out. The same seeds give the same result.",
+                help=with_words(
+                    "The episodes start from this seed, the next one, and so on, the same with "
+                    "every rule taken out. The same seeds give the same result."
+                ),
             )
             projection, outside = shield_choice(env)
         policy_file = own_policy(agent, env)

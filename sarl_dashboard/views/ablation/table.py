@@ -23,6 +23,7 @@ from sarl_core.mining.language import sentence
 from sarl_core.studies.ablation import Ablation
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.safety import safety_tiles
 from sarl_dashboard.components.settings import notes_notice
@@ -64,8 +65,10 @@ def show(ablation: Ablation, choice: AblationChoice, *, at_work: bool) -> None:
             f"{ablation.played:,}",
             border=True,
             height="stretch",
-            help=f"Of {len(ablation.rules) * len(ablation.base):,}: in the others the rule that is "
-            "taken out changed nothing, so they are the same without it.",
+            help=with_words(
+                f"Of {len(ablation.rules) * len(ablation.base):,}: in the others the rule that is "
+                "taken out changed nothing, so they are the same without it."
+            ),
         )
     if not at_work:
         st.markdown("\n".join(f"- {escaped(text)}" for text in ablation_text(ablation)))

@@ -16,6 +16,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.column_form import ColumnForm
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import rule_set_choice
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_choice import rules_for
@@ -83,15 +84,17 @@ def chosen_logs(rules: ChosenRules) -> Logs:
         key="log",
         on_change=_forget,
         args=("log",),
-        help="What somebody did, step by step, in any format that demonstrations are read in. "
-        "Features, actions and labels are matched by their names.",
+        help=with_words(
+            "What somebody did, step by step, in any format that demonstrations are read in. "
+            "Features, actions and labels are matched by their names."
+        ),
     )
     second = right.file_uploader(
         "Another log, as after a change (optional)",
         key="other_log",
         on_change=_forget,
         args=("other_log",),
-        help="To compare with",
+        help=with_words("To compare with"),
     )
     if first is None:
         st.info(

@@ -12,6 +12,7 @@ from sarl_core.demonstrations.warnings import find_warnings
 from sarl_core.explaining.figures.distributions import FeatureRow, feature_rows
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.hold_out import leave_out_choice, parting_lines
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state.data import all_demonstrations
 from sarl_dashboard.text import escaped, in_full
 
@@ -49,23 +50,31 @@ def show_overview(demonstrations: Demonstrations, contents: Contents) -> None:
             "Steps",
             f"{summary.steps:,}",
             border=True,
-            help="Pairs of a state and the action the expert took in it.",
+            help=with_words("Pairs of a state and the action the expert took in it."),
         )
         st.metric("Episodes", f"{summary.episodes:,}", border=True)
         st.metric(
-            "Features", f"{summary.features:,}", border=True, help="Numbers that describe a state."
+            "Features",
+            f"{summary.features:,}",
+            border=True,
+            help=with_words("Numbers that describe a state."),
         )
-        st.metric("Actions", actions, border=True, help=of_actions.capitalize() + ".")
+        st.metric("Actions", actions, border=True, help=with_words(of_actions.capitalize() + "."))
         st.metric(
-            "Mean length", f"{summary.length_mean:,.1f}", border=True, help="Steps an episode."
+            "Mean length",
+            f"{summary.length_mean:,.1f}",
+            border=True,
+            help=with_words("Steps an episode."),
         )
         st.metric(
             "Mean return",
             "–" if summary.return_mean is None else f"{summary.return_mean:,.1f}",
             border=True,
-            help="Sum of rewards of an episode, over the episodes that ended."
-            if summary.return_mean is not None
-            else "There are no rewards in these data.",
+            help=with_words(
+                "Sum of rewards of an episode, over the episodes that ended."
+                if summary.return_mean is not None
+                else "There are no rewards in these data."
+            ),
         )
     parts = [
         f"Environment **{escaped(demonstrations.env_id or 'not given')}**",

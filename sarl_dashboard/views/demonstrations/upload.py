@@ -12,6 +12,7 @@ from sarl_core.demonstrations.formats import ColumnRole, read_files
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError
 from sarl_dashboard.components.column_form import ColumnForm
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state.data import set_upload, uncombined_demonstrations
 from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
@@ -110,11 +111,13 @@ def upload_section(*, expanded: bool) -> None:
             accept_multiple_files=True,
             key="upload_files",
             on_change=read_new_upload,
-            help="Parquet, CSV, TSV, JSON lines, Arrow, Excel, HDF5 (D4RL) or NPZ, text also as "
-            ".gz; the pair obs.csv and actions.csv; one file an episode; the ZIP of a folder as "
-            "Minari, LeRobot or Hugging Face's datasets write it. A table has one row a step: "
-            "episode, step, obs_<name> …, action or action_<name> …, and if there are any reward, "
-            "terminated, truncated.",
+            help=with_words(
+                "Parquet, CSV, TSV, JSON lines, Arrow, Excel, HDF5 (D4RL) or NPZ, text also as "
+                ".gz; the pair obs.csv and actions.csv; one file an episode; the ZIP of a folder "
+                "as Minari, LeRobot or Hugging Face's datasets write it. A table has one row a "
+                "step: episode, step, obs_<name> …, action or action_<name> …, and if there are "
+                "any reward, terminated, truncated."
+            ),
         )
         right.selectbox(
             "Environment (optional)",
@@ -125,8 +128,10 @@ def upload_section(*, expanded: bool) -> None:
             key="upload_env",
             on_change=_read_again,
             bind="query-params",
-            help="Names, units and bounds are taken from it where the file has none. Any id "
-            "that Gymnasium knows.",
+            help=with_words(
+                "Names, units and bounds are taken from it where the file has none. Any id "
+                "that Gymnasium knows."
+            ),
         )
         form = _form()
         # What is wrong with a choice in the form stands beside its button.
@@ -149,6 +154,8 @@ def _problem() -> None:
             "Leave out the steps that lack a value",
             key="upload_missing",
             on_change=_read_again,
-            help="An empty cell, NaN, null or NA among observations, actions and rewards. "
-            "What is left of an episode keeps its number and the numbers of its steps.",
+            help=with_words(
+                "An empty cell, NaN, null or NA among observations, actions and rewards. "
+                "What is left of an episode keeps its number and the numbers of its steps."
+            ),
         )

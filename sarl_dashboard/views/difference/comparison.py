@@ -21,6 +21,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.decisions import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
 from sarl_dashboard.cache import cached
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import notes_notice, switch
 from sarl_dashboard.components.tables import action_column, row_height, table_height
 from sarl_dashboard.state.data import chosen_demonstrations
@@ -172,9 +173,11 @@ def _show_rules(compared: RuleSetComparison) -> None:
     disagreements = compared.disagreement
     st.markdown(
         _headed("Rules", _small(rows_text(disagreements))),
-        help="Rules are the same rule where they ask the same, or where they share more than "
-        "half of the states that either of them applies to. A changed one has other conditions, "
-        "says something else, was switched on or off, or has another place.",
+        help=with_words(
+            "Rules are the same rule where they ask the same, or where they share more than "
+            "half of the states that either of them applies to. A changed one has other "
+            "conditions, says something else, was switched on or off, or has another place."
+        ),
     )
     counts = (
         len(disagreements.difference.added),

@@ -8,6 +8,7 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_core.mining.rule_set import RuleSet
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import RULE_SETS, offered_rule_sets, rule_sets_help
 from sarl_dashboard.state import in_force, rule_base
 from sarl_dashboard.state.rule_choice import BETWEEN, rules_for
@@ -55,7 +56,9 @@ def chosen_sides() -> list[Side]:
         key="_sets_choice",
         max_selections=MOST,
         on_change=_choose,
-        help=f"Two to five; the others are held against the first. {rule_sets_help(offered)}",
+        help=with_words(
+            f"Two to five; the others are held against the first. {rule_sets_help(offered)}"
+        ),
     )
     sides: list[Side] = []
     for name in chosen:

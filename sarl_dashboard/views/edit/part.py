@@ -19,6 +19,7 @@ from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_core.mining.tree import PolicyTree, splits_of
 from sarl_core.shielding.effects import Verdicts, change
 from sarl_dashboard.cache import cached
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.tables import row_height, table_height
 from sarl_dashboard.state import edits, in_force
 from sarl_dashboard.state.data import chosen_demonstrations, held_out_demonstrations
@@ -150,8 +151,10 @@ def _chosen_part(way: Way, rule: Rule, now: Verdicts, whole: TreePart) -> TreePa
         format_func=lambda at: _node_text(tree, way, at),
         key=key,
         on_change=choose,
-        help="What lies below this node is grown anew. The last one on the way is the smallest "
-        "part; the first is the whole tree.",
+        help=with_words(
+            "What lies below this node is grown anew. The last one on the way is the smallest "
+            "part; the first is the whole tree."
+        ),
     )
     return TreePart(whole.base, now, whole.trees, whole.dimension, way.places[at], way.rules[at])
 

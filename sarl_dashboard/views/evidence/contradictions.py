@@ -19,6 +19,7 @@ from sarl_core.mining.validation.contradictions import (
 )
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.components.worked_out import worked_out
 from sarl_dashboard.state import hold_out
@@ -48,8 +49,10 @@ def show_contradictions(remaining: Demonstrations, rule_set: RuleSet) -> None:
             key="reach",
             bind="query-params",
             width=340,
-            help="No feature of the two states differs by more than this share of its standard "
-            "deviation over all states.",
+            help=with_words(
+                "No feature of the two states differs by more than this share of its standard "
+                "deviation over all states."
+            ),
         )
     )
     st.caption(

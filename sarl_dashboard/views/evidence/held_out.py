@@ -6,6 +6,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.language import counted
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import hold_out
 from sarl_dashboard.text import in_full
 
@@ -34,8 +35,10 @@ def hold_out_choice(whole: Demonstrations) -> None:
             key="_holdout_choice",
             on_change=lambda: hold_out.choose_share(st.session_state["_holdout_choice"]),
             width=380,
-            help="Rules are mined from the other episodes and tried on these. Whole episodes, "
-            "because the steps within one are alike.",
+            help=with_words(
+                "Rules are mined from the other episodes and tried on these. Whole episodes, "
+                "because the steps within one are alike."
+            ),
         )
         st.number_input(
             "Seed",
@@ -46,7 +49,7 @@ def hold_out_choice(whole: Demonstrations) -> None:
                 int(st.session_state["_holdout_seed_choice"] or 0)
             ),
             width=120,
-            help="Another one draws other episodes.",
+            help=with_words("Another one draws other episodes."),
         )
     if parts.problem:
         st.warning(in_full(parts.problem), icon=":material/warning:")

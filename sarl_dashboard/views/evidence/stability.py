@@ -13,6 +13,7 @@ from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.stability import SAME_RULE, Stability, rule_stability
 from sarl_core.progress import Progress
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.components.worked_out import worked_out
 from sarl_dashboard.views.evidence.evidence import RuleSetEvidence
@@ -41,8 +42,10 @@ def show_stability(evidence: RuleSetEvidence) -> None:
                 key="rounds",
                 bind="query-params",
                 width=130,
-                help="In each, as many episodes as there are are drawn, some of them several "
-                "times and others not at all, and the rules are mined again.",
+                help=with_words(
+                    "In each, as many episodes as there are are drawn, some of them several "
+                    "times and others not at all, and the rules are mined again."
+                ),
             )
         )
         st.caption(

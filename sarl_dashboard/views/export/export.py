@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -47,5 +49,5 @@ def show_export(demonstrations: Demonstrations) -> None:
         keep_rules_form(
             prepared.rule_set,
             in_force=chosen.rules == in_force.kind(),
-            command=command_of(chosen, demonstrations),
+            command=partial(command_of, chosen, demonstrations),
         )

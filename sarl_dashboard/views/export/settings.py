@@ -10,6 +10,7 @@ import streamlit as st
 from sarl_core.errors import SarlError
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import projection_choice, rule_set_choice
 from sarl_dashboard.state.agents import PROJECTIONS
 from sarl_dashboard.state.rule_choice import rules_for
@@ -110,13 +111,17 @@ def settings() -> ExportSettings:
                 value=True,
                 key="rounded",
                 bind="query-params",
-                help="To the fewest digits that change no decision on the demonstrations",
+                help=with_words(
+                    "To the fewest digits that change no decision on the demonstrations"
+                ),
             )
             merged = st.toggle(
                 "Merge conditions",
                 key="merged",
                 bind="query-params",
-                help="Several conditions on one feature become one interval, and each rule stands "
-                "by itself: easier to read, slower to execute",
+                help=with_words(
+                    "Several conditions on one feature become one interval, and each rule stands "
+                    "by itself: easier to read, slower to execute"
+                ),
             )
     return ExportSettings(choice, rule_set, form, projection, rounded, merged)

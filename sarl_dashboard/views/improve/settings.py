@@ -13,6 +13,7 @@ from sarl_core.improving.plan import Plan
 from sarl_core.improving.refinement import refinement_cost
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.rollouts.choices import CHOICE_TEXTS, Choice
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import environment_choice
 from sarl_dashboard.state.agents import PolicyFile, has_expert, own_agents, policy_upload
 from sarl_dashboard.state.environments import environment_of
@@ -45,7 +46,9 @@ class ImproveChoices:
 
 def number(label: str, key: str, low: int, high: int, usual: int, hint: str) -> int:
     """A whole number."""
-    value = st.number_input(label, low, high, usual, key=key, bind="query-params", help=hint)
+    value = st.number_input(
+        label, low, high, usual, key=key, bind="query-params", help=with_words(hint)
+    )
     return int(usual if value is None else value)
 
 
@@ -72,9 +75,11 @@ def settings(demonstrations: Demonstrations) -> ImproveChoices:
                 index=experts.index(_usual_expert(env)),
                 key="expert",
                 bind="query-params",
-                help="Who is asked. Shipped: the expert that comes with this environment. Own "
-                "file: a policy of yours. Nobody: the page shows which states need a "
-                "demonstration.",
+                help=with_words(
+                    "Who is asked. Shipped: the expert that comes with this environment. Own "
+                    "file: a policy of yours. Nobody: the page shows which states need a "
+                    "demonstration."
+                ),
             )
             if has_expert:
                 max_rules = number(
@@ -149,8 +154,10 @@ def _further(demonstrations: Demonstrations, rounds: int, *, has_expert: bool) -
             (EVERY_LEAF, AT_THRESHOLDS),
             key="cut",
             bind="query-params",
-            help="Every leaf: in every state some rule applies. At the thresholds: only where "
-            "support and confidence reach those in the sidebar; elsewhere the agent acts alone.",
+            help=with_words(
+                "Every leaf: in every state some rule applies. At the thresholds: only where "
+                "support and confidence reach those in the sidebar; elsewhere the agent acts alone."
+            ),
         )
         episodes = _episodes("Episodes a round")
         validation = number(
@@ -168,9 +175,11 @@ def _further(demonstrations: Demonstrations, rounds: int, *, has_expert: bool) -
             key="choose",
             bind="query-params",
             format_func=lambda name: f"{name} first",
-            help="Which of the tried is the best. Return: the highest mean return. Failures: the "
-            "fewest failures, and among equals the highest mean return. It is reported on other "
-            "episodes.",
+            help=with_words(
+                "Which of the tried is the best. Return: the highest mean return. Failures: the "
+                "fewest failures, and among equals the highest mean return. It is reported on "
+                "other episodes."
+            ),
         )
         if cut == EVERY_LEAF:
             none, one = (refinement_cost(turns, Plan.search_episodes, rounds) for turns in range(2))
@@ -194,6 +203,6 @@ def _further(demonstrations: Demonstrations, rounds: int, *, has_expert: bool) -
             key="divider",
             value=MIN_DIVIDER,
             bind="query-params",
-            help="Number of equal intervals each continuous action is divided into.",
+            help=with_words("Number of equal intervals each continuous action is divided into."),
         )
     return FurtherChoices(episodes, cut, refinement, validation, seed, divider, choose)

@@ -13,6 +13,7 @@ from sarl_core.learning.run import TRIAL_EPISODES
 from sarl_core.learning.study import LearningPlan
 from sarl_core.rollouts.choices import CHOICE_TEXTS, Choice
 from sarl_core.shielding.projection import Projection
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import notes_notice, projection_choice, rule_set_choice
 from sarl_dashboard.jobs.learning import LearningOrder
 from sarl_dashboard.state.agents import AGENTS, PROJECTIONS, has_expert, own_agents
@@ -40,8 +41,10 @@ def settings() -> LearningOrder | None:
                 key="learn_steps",
                 bind="query-params",
                 persist_state="session",
-                help="Of each learner. Lunar Lander needs 100,000 and more to show what a way to "
-                "learn is worth, Cart Pole 30,000.",
+                help=with_words(
+                    "Of each learner. Lunar Lander needs 100,000 and more to show what a way to "
+                    "learn is worth, Cart Pole 30,000."
+                ),
             )
             seeds = st.number_input(
                 "Learners of each kind",
@@ -51,7 +54,7 @@ def settings() -> LearningOrder | None:
                 key="learn_seeds",
                 bind="query-params",
                 persist_state="session",
-                help="One may have been lucky; three say more.",
+                help=with_words("One may have been lucky; three say more."),
             )
         names = st.pills(
             "Ways to learn",
@@ -128,7 +131,7 @@ def further_settings() -> FurtherSettings:
             key="learn_episodes",
             bind="query-params",
             persist_state="session",
-            help="After learning, of each learner, without the shield and with it.",
+            help=with_words("After learning, of each learner, without the shield and with it."),
         )
         projection = PROJECTIONS[0] if is_discrete() else projection_choice()
         choose = st.selectbox(
@@ -138,9 +141,11 @@ def further_settings() -> FurtherSettings:
             bind="query-params",
             persist_state="session",
             format_func=lambda name: f"{name} first",
-            help="Which way to learn is the best of those that are safe and good. Return: the "
-            "highest mean return afterwards. Failures: the fewest failures, and among equals "
-            "the highest mean return. It is reported on other episodes.",
+            help=with_words(
+                "Which way to learn is the best of those that are safe and good. Return: the "
+                "highest mean return afterwards. Failures: the fewest failures, and among equals "
+                "the highest mean return. It is reported on other episodes."
+            ),
         )
         agent = st.selectbox(
             "Compare with",
@@ -148,8 +153,10 @@ def further_settings() -> FurtherSettings:
             key="learn_compare",
             bind="query-params",
             persist_state="session",
-            help="An agent that plays the episodes after learning too, without the shield and "
-            "with it, and learns nothing.",
+            help=with_words(
+                "An agent that plays the episodes after learning too, without the shield and "
+                "with it, and learns nothing."
+            ),
         )
     return FurtherSettings(int(episodes), projection, choose, agent)
 

@@ -17,6 +17,7 @@ from sarl_core.library.bundles import ENDING, export_bundle
 from sarl_core.library.contents import rules_of
 from sarl_core.library.items import UNLISTED
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import in_force
 from sarl_dashboard.state.data import choose_dataset
 from sarl_dashboard.state.rule_choice import comparison_address
@@ -119,7 +120,9 @@ def _buttons(opened: Library, item: Item, author: str, *, own: bool) -> None:
             on_change=_change,
             args=(opened.share, item, author),
             kwargs={"shared": not item.shared},
-            help="It then stands in everybody's list. Whoever has its link may look anyway.",
+            help=with_words(
+                "It then stands in everybody's list. Whoever has its link may look anyway."
+            ),
         )
         st.button(
             "Remove",

@@ -23,6 +23,7 @@ from sarl_dashboard.components.distributions import (
     show_distribution,
     show_legend,
 )
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import formulas, given_names
 from sarl_dashboard.state.formulas import Derived
 from sarl_dashboard.state.thresholds import chosen_divider
@@ -149,9 +150,11 @@ def formula_editor(raw: Demonstrations, named: Demonstrations) -> None:
         placeholder=example or "name [unit] = formula",
         live="300ms",
         persist_state="session",
-        help="A name, a unit in brackets (or none), an equals sign; then numbers, names of "
-        "features, + - * /, min, max, abs and parentheses. A name is written as it is, with "
-        "spaces or underscores, and in quotation marks where it has other signs.",
+        help=with_words(
+            "A name, a unit in brackets (or none), an equals sign; then numbers, names of "
+            "features, + - * /, min, max, abs and parentheses. A name is written as it is, with "
+            "spaces or underscores, and in quotation marks where it has other signs."
+        ),
     )
     is_empty = not (text or "").strip()
     if is_empty and place is None:

@@ -10,7 +10,7 @@ from sarl_core.explaining.words.fork import ending_texts
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rules import UNFILTERED
 from sarl_core.rollouts.episodes import Episodes
-from sarl_dashboard.components.journey.words import word_help
+from sarl_dashboard.components.journey.words import with_words, word_help
 from sarl_dashboard.components.safety import freedom_cell
 from sarl_dashboard.jobs.replays import ReplayPair
 from sarl_dashboard.state.rule_files import CHOSEN
@@ -41,14 +41,14 @@ def numbers(replay: ReplayPair) -> None:
             share_text(changed / length),
             border=True,
             height="stretch",
-            help=f"The rules changed the action at {changed:,} of {length:,} steps.",
+            help=with_words(f"The rules changed the action at {changed:,} of {length:,} steps."),
         )
         st.metric(
             "Covered",
             share_text(covered / length),
             border=True,
             height="stretch",
-            help=f"Some rule applied at {covered:,} of {length:,} steps.",
+            help=with_words(f"Some rule applied at {covered:,} of {length:,} steps."),
         )
         st.metric(
             "Freedom",

@@ -28,6 +28,7 @@ from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.step_filters import StepFilter, used_rules
 from sarl_core.rollouts.steps import StepTable
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import switch
 from sarl_dashboard.jobs.replays import REPLAY, Played, ReplayPair, compared, comparison_cache
 from sarl_dashboard.views.replay.run import jump_to
@@ -147,8 +148,10 @@ def filters(recorded: Recorded) -> tuple[StepFilter, str]:
                 selection_mode="multi",
                 key="only",
                 bind="query-params",
-                help="Outside the data: the state lies outside what was seen of a rule that the "
-                "agent's action breaks. Only rules that keep their data box can say so.",
+                help=with_words(
+                    "Outside the data: the state lies outside what was seen of a rule that the "
+                    "agent's action breaks. Only rules that keep their data box can say so."
+                ),
             )
             used = {
                 rule_set.name_of(rule_set.rules[index]): int(index)
@@ -160,7 +163,7 @@ def filters(recorded: Recorded) -> tuple[StepFilter, str]:
                 key="by_rule",
                 bind="query-params",
                 width=180,
-                help="Those in force at some step, the most frequent first.",
+                help=with_words("Those in force at some step, the most frequent first."),
             )
             rule, name = used.get(str(picked)), str(picked)
         if recorded.several:

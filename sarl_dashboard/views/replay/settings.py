@@ -11,6 +11,7 @@ from sarl_core.explaining.words.replay import named_description
 from sarl_core.rollouts.player import shield_for
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside, Shield
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import (
     environment_choice,
     own_policy,
@@ -79,9 +80,11 @@ def settings() -> ReplaySettings:
                 offered_agents(),
                 key="agent",
                 bind="query-params",
-                help="Novice: random actions. Untrained: a fresh network, its actions sampled. "
-                "Expert: the one that is shipped for this environment. Own file: a policy "
-                "of yours.",
+                help=with_words(
+                    "Novice: random actions. Untrained: a fresh network, its actions sampled. "
+                    "Expert: the one that is shipped for this environment. Own file: a policy "
+                    "of yours."
+                ),
             )
             rules = rule_set_choice("rules", more=[NO_RULES])
             seed = st.number_input(
@@ -91,8 +94,10 @@ def settings() -> ReplaySettings:
                 FRESH_SEED,
                 key="seed",
                 bind="query-params",
-                help="Both runs start in the same state and draw the same random numbers; the "
-                "same seed gives the same replay.",
+                help=with_words(
+                    "Both runs start in the same state and draw the same random numbers; the "
+                    "same seed gives the same replay."
+                ),
             )
             projection, outside = shield_choice(env)
         policy_file = own_policy(agent, env)

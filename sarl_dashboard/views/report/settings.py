@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import rule_set_choice
 
 
@@ -37,8 +38,10 @@ def settings(has_comparison: bool) -> ReportChoices:
                 60,
                 key="in_full",
                 bind="query-params",
-                help="So many rules with evidence, conditions and pictures, those that apply most "
-                "often. The others stand in a table.",
+                help=with_words(
+                    "So many rules with evidence, conditions and pictures, those that apply most "
+                    "often. The others stand in a table."
+                ),
             )
             frames = st.number_input(
                 "Pictures a rule",
@@ -47,8 +50,10 @@ def settings(has_comparison: bool) -> ReportChoices:
                 3,
                 key="frames",
                 bind="query-params",
-                help="States in which the rule applies, from episodes that the shipped expert "
-                "plays, or a novice held to the rules.",
+                help=with_words(
+                    "States in which the rule applies, from episodes that the shipped expert "
+                    "plays, or a novice held to the rules."
+                ),
             )
         with_session = False
         if has_comparison:

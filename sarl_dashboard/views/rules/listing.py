@@ -18,6 +18,7 @@ from sarl_core.mining.rule_set import RuleSet, rules_to_json
 from sarl_core.mining.validation.holding_out import lower_bound, shortfall, with_lower_bound
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import search_box
 from sarl_dashboard.components.tables import frame
 from sarl_dashboard.state.data import data_parts, held_out_demonstrations
@@ -182,8 +183,10 @@ def lower_bound_choice() -> float:
         key="lower",
         bind="query-params",
         width=150,
-        help="Only rules whose 95 % interval of confidence, over the held-out episodes, lies at or "
-        "above this. The downloads hold these rules. 0: all.",
+        help=with_words(
+            "Only rules whose 95 % interval of confidence, over the held-out episodes, lies at or "
+            "above this. The downloads hold these rules. 0: all."
+        ),
     )
     return float(least or 0.0)
 

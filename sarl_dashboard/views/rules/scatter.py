@@ -21,6 +21,7 @@ from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_dashboard.cache import cached
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state.url import set_url_choice
 
 _BARE = {"displayModeBar": False, "scrollZoom": False}
@@ -54,7 +55,7 @@ def axis_choices(rule_set: RuleSet) -> tuple[RuleMeasure, RuleMeasure]:
                 key=key,
                 bind="query-params",
                 width=_WIDTH,
-                help=_MEANING,
+                help=with_words(_MEANING),
             )
             for label, key, index in (("To the right", "across", 0), ("Upwards", "upwards", 1))
         ]

@@ -10,6 +10,7 @@ import streamlit as st
 from sarl_core.errors import SarlError
 from sarl_core.mining.rules import FILTERED, UNFILTERED
 from sarl_core.shielding.shield import Outside, Projection
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import (
     environment_choice,
     offered_rule_sets,
@@ -86,8 +87,10 @@ def settings() -> ShieldChoices:
                 20,
                 key="episodes",
                 bind="query-params",
-                help="So many for every agent with every shield, each on a seed of its own. The "
-                "paper's figures show 100.",
+                help=with_words(
+                    "So many for every agent with every shield, each on a seed of its own. The "
+                    "paper's figures show 100."
+                ),
             )
             seed = st.number_input(
                 "First seed",
@@ -96,8 +99,10 @@ def settings() -> ShieldChoices:
                 FRESH_SEED,
                 key="first_seed",
                 bind="query-params",
-                help="The episodes start from this seed, the next one, and so on, the same for "
-                "all agents. The same seeds give the same result.",
+                help=with_words(
+                    "The episodes start from this seed, the next one, and so on, the same for "
+                    "all agents. The same seeds give the same result."
+                ),
             )
             projection, outside = shield_choice(env)
         agents = st.pills(
@@ -107,9 +112,11 @@ def settings() -> ShieldChoices:
             default=_usual_agents(env),
             key="agents",
             bind="query-params",
-            help="Novice: random actions. Expert: the one that is shipped for this environment. "
-            "Untrained: a fresh network, its actions sampled, which is nearly the same as random. "
-            "Own file: policies of yours.",
+            help=with_words(
+                "Novice: random actions. Expert: the one that is shipped for this environment. "
+                "Untrained: a fresh network, its actions sampled, which is nearly the same as "
+                "random. Own file: policies of yours."
+            ),
         )
         policy_files: list[PolicyFile] = []
         if OWN_FILE in agents:
@@ -124,7 +131,7 @@ def settings() -> ShieldChoices:
             default=_usual_shields(),
             key="shields",
             bind="query-params",
-            help=rule_sets_help(offered),
+            help=with_words(rule_sets_help(offered)),
         )
     return ShieldChoices(
         env,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.mining.language import counted
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import combining, rule_base
 from sarl_dashboard.state.combining import CombinationChoice
 from sarl_dashboard.state.data import data_parts, uncombined_parts
@@ -26,9 +27,11 @@ def combinations_choice() -> None:
             "Combinations of two features",
             key="_combinations",
             on_change=_switch,
-            help="Let rules ask about two features together, as “position plus 0.5 s of "
-            "velocity”: the ratios that tell most about the actions are chosen from the episodes "
-            "that rules are mined from.",
+            help=with_words(
+                "Let rules ask about two features together, as “position plus 0.5 s of "
+                "velocity”: the ratios that tell most about the actions are chosen from the "
+                "episodes that rules are mined from."
+            ),
         )
         if not choice.on:
             return

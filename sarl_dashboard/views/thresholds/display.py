@@ -14,7 +14,7 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
 from sarl_core.mining.thresholds.steps import FINE_CONFIDENCES, FINE_SUPPORTS
 from sarl_core.mining.tree import PolicyTree
-from sarl_dashboard.components.journey.words import word_help
+from sarl_dashboard.components.journey.words import with_words, word_help
 from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.compact_set import Compact
@@ -159,7 +159,7 @@ def more() -> None:
             key="depth",
             bind="query-params",
             on_change=rule_base.choose,
-            help="Most conditions of a rule. 0: no limit.",
+            help=with_words("Most conditions of a rule. 0: no limit."),
         )
 
 

@@ -21,6 +21,7 @@ from sarl_core.mining.quantisation import (
 from sarl_core.studies.divider import snapped_agents
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.run_bar import episodes_bar, watched
 from sarl_dashboard.jobs.episodes import EpisodeBatch, Row, known
 from sarl_dashboard.jobs.job import Place
@@ -111,7 +112,7 @@ def show_returns(demonstrations: Demonstrations, divided: Divided) -> None:
             20,
             key="divider_episodes",
             bind="query-params",
-            help=f"On the seeds from {FRESH_SEED:,}, the same for all.",
+            help=with_words(f"On the seeds from {FRESH_SEED:,}, the same for all."),
         )
     )
     rows = snapped_rows(demonstrations, env_id, divided)

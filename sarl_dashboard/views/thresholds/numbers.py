@@ -11,7 +11,7 @@ from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import share_text
 from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_core.mining.validation.cross_fitting import Judged
-from sarl_dashboard.components.journey.words import word_help
+from sarl_dashboard.components.journey.words import with_words, word_help
 
 _ELSEWHERE = "Elsewhere: in an episode that the rules were not mined from, on average."
 
@@ -47,8 +47,10 @@ def show_numbers(point: Landscape, judged: Judged | None) -> None:
             st.metric(
                 "Held-out fidelity",
                 share_text(float(point.held_out_fidelity[0, 0]), decimals=1),
-                help="The same on the episodes held out, which no rule was mined from; on average, "
-                "so that each episode counts once",
+                help=with_words(
+                    "The same on the episodes held out, which no rule was mined from; on average, "
+                    "so that each episode counts once"
+                ),
             )
 
 

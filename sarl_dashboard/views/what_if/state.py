@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.words import Coded, indicated, spelled, words_of
 from sarl_core.mining.language import counted
 from sarl_core.shielding.sampling import Span, random_state, within
+from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.jobs.replays import latest
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.what_if.situation import Situation
@@ -40,8 +41,10 @@ def source_choice(situation: Situation) -> None:
                 on_change=_take,
                 args=(situation,),
                 width=280,
-                help="Where the sliders are put. Then move any of them. Covered: every action "
-                "dimension has a rule. Uncovered: some dimension has none.",
+                help=with_words(
+                    "Where the sliders are put. Then move any of them. Covered: every action "
+                    "dimension has a rule. Uncovered: some dimension has none."
+                ),
             )
             st.number_input(
                 "Number",
@@ -53,8 +56,10 @@ def source_choice(situation: Situation) -> None:
                 on_change=_take,
                 args=(situation,),
                 width=150,
-                help="The row of the demonstrations, the step of the replay, or the seed of a "
-                "random state. The same number gives the same state.",
+                help=with_words(
+                    "The row of the demonstrations, the step of the replay, or the seed of a "
+                    "random state. The same number gives the same state."
+                ),
             )
             st.button(
                 "Take it",
