@@ -96,5 +96,5 @@ def keep_result_button(
 def _address() -> str:
     """Of this page, from where the dashboard begins."""
     page = urlsplit(st.context.url or "").path.rsplit("/", 1)[-1]
-    asked = {name: st.query_params.get_all(name) for name in st.query_params}
-    return f"{page}?{urlencode(asked, doseq=True)}" if page else ""
+    parameters = {name: st.query_params.get_all(name) for name in st.query_params}
+    return f"{page}?{urlencode(parameters, doseq=True)}" if page else ""
