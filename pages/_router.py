@@ -11,15 +11,23 @@ from sarl_dashboard.components.journey.brand import ICON, show_logo
 from sarl_dashboard.components.journey.first_run import show_first_run
 from sarl_dashboard.components.journey.next_step import next_step
 from sarl_dashboard.components.journey.words import words_button
-from sarl_dashboard.components.sidebar import require_data, require_rules, sidebar
+from sarl_dashboard.components.sidebar import (
+    require_data,
+    require_rules,
+    sidebar,
+    threshold_parameters,
+)
 from sarl_dashboard.session import settle
 from sarl_dashboard.state import data_words, in_force
 from sarl_dashboard.state.url import (
     absurd_parameters,
     begin_run,
+    bring_along,
+    end_run,
     say_left_out,
     show_left_out,
     without,
+    write_url,
 )
 
 # The tab's title is that of the page.
@@ -81,6 +89,7 @@ aliases = [
     st.Page(lambda: None, title=title, url_path=path, visibility="hidden")
     for path, title in ALIASES.items()
 ]
+bring_along(threshold_parameters())
 page = st.navigation(SECTIONS | {"Start": [*SECTIONS["Start"], *aliases]}, expanded=True)
 if page in aliases:
     meant = next(other for other in PAGES if other.title == page.title)
@@ -93,9 +102,12 @@ if absurd := absurd_parameters():
 st.html(style_sheet())
 show_logo()
 show_left_out(page.title)
-data_words.take_up()
-in_force.take_up()
-sidebar(with_thresholds=page.title != "Thresholds")
+try:
+    data_words.take_up()
+    in_force.take_up()
+    sidebar(with_thresholds=page.title != "Thresholds")
+finally:
+    write_url()
 words_button()
 try:
     if page.title != "Library":
@@ -106,4 +118,5 @@ try:
     page.run()
     next_step(page.title)
 finally:  # also where the page ends early: then it has said itself what to do
+    end_run()
     settle(page.title, len(sys.modules))

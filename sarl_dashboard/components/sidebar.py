@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable
 
 import streamlit as st
-from streamlit.errors import StreamlitAPIException
 
 from sarl_core.environments.formulas import Formula
 from sarl_core.errors import SarlError
 from sarl_core.mining.language import counted, threshold_text
-from sarl_core.mining.rules import FILTERED, Thresholds
+from sarl_core.mining.rules import FILTERED
 from sarl_dashboard.components.hold_out import parting_lines
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import combining, data_words, in_force, rule_base
@@ -30,24 +28,23 @@ from sarl_dashboard.state.thresholds import (
     chosen_divider,
     chosen_thresholds,
 )
+from sarl_dashboard.state.url import say_in_url
 from sarl_dashboard.text import refuse
 
 
-def _keep_in_url(thresholds: Thresholds, divider: int) -> None:
-    """Write what is in force into the URL, on a page whose widgets do not."""
-    for name, value, default in (
-        ("support", thresholds.support, FILTERED.support),
-        ("confidence", thresholds.confidence, FILTERED.confidence),
-        ("lift", thresholds.lift, 0.0),
-        ("depth", thresholds.max_depth or 0, 0),
-        ("divider", divider, MIN_DIVIDER),
-    ):
-        # Just after a change of page the parameter may still belong to the other page's widget.
-        with contextlib.suppress(StreamlitAPIException):
-            if value == default:
-                st.query_params.pop(name, None)
-            elif st.query_params.get(name) != threshold_text(value):
-                st.query_params[name] = threshold_text(value)
+def threshold_parameters() -> dict[str, str | None]:
+    """What the URL says of the thresholds in force, also on pages that have no widgets for them."""
+    thresholds = chosen_thresholds()
+    return {
+        name: None if value == default else threshold_text(value)
+        for name, value, default in (
+            ("support", thresholds.support, FILTERED.support),
+            ("confidence", thresholds.confidence, FILTERED.confidence),
+            ("lift", thresholds.lift, 0.0),
+            ("depth", thresholds.max_depth or 0, 0),
+            ("divider", chosen_divider(), MIN_DIVIDER),
+        )
+    }
 
 
 def require_data(title: str) -> None:
@@ -148,8 +145,8 @@ def sidebar(*, with_thresholds: bool = True) -> None:
     # A page without sliders keeps what a link says, for the page that has them.
     choose_thresholds(thresholds)
     choose_divider(divider)
-    if with_thresholds:
-        _keep_in_url(thresholds, divider)
+    for parameter, value in threshold_parameters().items():
+        say_in_url(parameter, value)
     # The widget follows the URL, so a link and the browser's "back" both reach it.
     st.session_state["_data_choice"] = name
     labels = dataset_labels()

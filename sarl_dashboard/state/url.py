@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import cast
 
 import streamlit as st
 from streamlit.runtime.scriptrunner import get_script_run_ctx
+from streamlit.runtime.state import get_session_state
 
 from sarl_dashboard.text import escaped
 
@@ -39,8 +41,8 @@ def url_text(name: str, default: str, valid: Callable[[str], bool]) -> str:
         The default, or a valid text.
     """
     st.session_state.setdefault("_url_names", set()).add(name)
-    value = st.query_params.get(name)
-    if value is not None and _is_late(name, value):
+    value = _in_url(name)
+    if value is not None and name not in _waiting() and _is_late(name, value):
         value = None  # the browser had not heard of the choice when it asked for this run
     if value is None or not valid(value):  # a change of page takes the parameters away
         value = str(st.session_state.get(f"_{name}", default))
@@ -59,17 +61,90 @@ def set_url_choice(name: str, value: str, default: str = "") -> None:
         default: Value that needs no place in the URL.
     """
     st.session_state[f"_{name}"] = value
-    before = st.query_params.get(name)
+    before = _in_url(name)
     left = st.session_state.setdefault("_values_left", {})
     if left.get(name) == value:
         del left[name]
     if before not in (None, value):
         left[name] = before
-    if value != default:
-        if before != value:
-            st.query_params[name] = value
-    elif before is not None:
-        del st.query_params[name]
+    say_in_url(name, None if value == default else value)
+
+
+def say_in_url(name: str, value: str | None) -> None:
+    """Let the URL say this of a parameter; what is a widget's says the widget.
+
+    Until everything beside a page is drawn it waits (`write_url`): the browser's "back" goes
+    through every address that was written, and one that says half of a change was never on screen.
+
+    Args:
+        name: URL parameter.
+        value: None to leave it out.
+    """
+    context = get_script_run_ctx()
+    if st.session_state.get("_url_waits") and not (context and context.fragment_ids_this_run):
+        _waiting()[name] = value
+        st.session_state.setdefault("_url_said", set()).add(name)
+    else:
+        beside = st.session_state.get("_url_beside", {})
+        if beside.get(name) != value:
+            beside.pop(name, None)
+        _write({name: value})
+
+
+def write_url() -> None:
+    """Write what waits into the URL, in one piece; from here on nothing waits in this run."""
+    st.session_state["_url_waits"] = False
+    waiting, said = _waiting(), st.session_state["_url_said"]
+    _write(waiting)
+    # In the order of the address: the same in another order is another one to go back to.
+    st.session_state["_url_beside"] = {
+        name: waiting[name] for name in st.query_params if name in said and waiting[name]
+    }
+    waiting.clear()
+
+
+def bring_along(now: Mapping[str, str | None]) -> None:
+    """Give the URL of another page at once what stands beside every page.
+
+    A link in the navigation names none of it. Before `st.navigation`: the browser writes the
+    address of the page with what it has heard until then, and goes back to that.
+
+    Args:
+        now: What is said of it that a part of the last page may have changed since.
+    """
+    context = get_script_run_ctx()
+    if not (context and context.is_history_navigation):
+        beside = st.session_state.get("_url_beside", {}) | now
+        _write({name: one for name, one in beside.items() if one and _in_url(name) is None})
+
+
+def end_run() -> None:
+    """Let what callbacks choose wait for the run that follows."""
+    st.session_state["_url_waits"] = True
+
+
+def _waiting() -> dict[str, str | None]:
+    """What the URL will say, and does not yet."""
+    return cast("dict[str, str | None]", st.session_state.setdefault("_url_waiting", {}))
+
+
+def _in_url(name: str) -> str | None:
+    waiting = _waiting()
+    return waiting[name] if name in waiting else st.query_params.get(name)
+
+
+def _write(values: Mapping[str, str | None]) -> None:
+    with get_session_state().query_params() as url:
+        free = {name: value for name, value in values.items() if not url.is_bound(name)}
+        put = {name: value for name, value in free.items() if value not in (None, url.get(name))}
+        gone = [name for name, value in free.items() if value is None and name in url]
+        # One message to the browser, and so one address among those to go back to.
+        for name in gone[0 if put else 1 :]:
+            url.discard_param_no_forward_msg(name)
+        if put:
+            url.update(put)
+        elif gone:
+            del url[gone[0]]
 
 
 def _is_late(name: str, value: str) -> bool:
@@ -94,8 +169,10 @@ def begin_run(page: str) -> None:
         for name in st.session_state.get("_url_names", ()):
             if name not in st.query_params:
                 st.session_state.pop(f"_{name}", None)
+    st.session_state["_url_waits"], st.session_state["_url_said"] = True, set()
     if st.session_state.get("_page") != page or went_back:
         st.session_state["_page"] = page
+        _waiting().clear()
         st.session_state.pop("_values_left", None)
 
 

@@ -99,3 +99,31 @@ def test_back_and_forward_bring_data_rules_page_and_selection(screen: Page) -> N
     screen.go_forward()
     expect(rules_choice(screen)).to_have_value("Compact rules")
     no_trace(screen)
+
+
+def test_back_goes_through_what_was_on_screen_and_nothing_else(screen: Page) -> None:
+    visit(screen, "/edit?data=cartpole&support=0.01", "Edit")
+    screen.get_by_role("button", name="Switch off").click()
+    expect(rules_choice(screen)).to_have_value("At the thresholds, with 1 edit")
+    settle(screen)
+    seen = [screen.url]
+    for page in ("Rules", "Compare", "What if"):
+        screen.get_by_role("link", name=page, exact=True).click()
+        expect(screen.get_by_role("heading", name=page, level=1)).to_be_visible()
+        settle(screen)
+        seen.append(screen.url)
+    choose(screen, data_choice(screen), "Pendulum")
+    seen.append(screen.url)
+    assert all("edits=" in url and "data=cartpole" in url for url in seen[:-1])
+    assert "edits=" not in seen[-1]
+    for url in reversed(seen[:-1]):
+        screen.go_back()
+        settle(screen)
+        assert screen.url == url
+        expect(rules_choice(screen)).to_have_value("At the thresholds, with 1 edit")
+    for url in seen[1:]:
+        screen.go_forward()
+        settle(screen)
+        assert screen.url == url
+    expect(data_choice(screen)).to_have_value("Pendulum")
+    no_trace(screen)
