@@ -18,7 +18,7 @@ from sarl_dashboard.components.sidebar import (
     threshold_parameters,
 )
 from sarl_dashboard.session import settle
-from sarl_dashboard.state import data_words, in_force
+from sarl_dashboard.state import data_words, in_force, library
 from sarl_dashboard.state.url import (
     absurd_parameters,
     begin_run,
@@ -108,6 +108,7 @@ try:
     sidebar(with_thresholds=page.title != "Thresholds")
 finally:
     write_url()
+library.say()
 words_button()
 try:
     if page.title != "Library":
@@ -117,6 +118,7 @@ try:
     show_first_run(page.title)
     page.run()
     next_step(page.title)
+    library.say()
 finally:  # also where the page ends early: then it has said itself what to do
     end_run()
     settle(page.title, len(sys.modules))

@@ -259,9 +259,14 @@ def annotate(demonstrations: Demonstrations, details: Mapping[str, Any]) -> None
 
 
 def say_once(problem: SarlError) -> None:
-    """Say in a visit, once, that what is made stays in it."""
+    """Let it be said in a visit, once, that what is made stays in it."""
     if st.session_state.get("_library_problem") != str(problem):
-        st.session_state["_library_problem"] = str(problem)
+        st.session_state["_library_problem"] = st.session_state["_library_unsaid"] = str(problem)
+
+
+def say() -> None:
+    """Say what is to be said: where a page runs as a whole, for what a part of it says is lost."""
+    if problem := st.session_state.pop("_library_unsaid", ""):
         st.toast(
             f"What you make is kept for this visit only: {problem}.", icon=":material/inventory_2:"
         )

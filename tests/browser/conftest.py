@@ -10,6 +10,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -32,17 +33,29 @@ expect.set_options(timeout=PATIENCE)
 @pytest.fixture(scope="session")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Where a dashboard runs, started as a user would start it."""
+    with dashboard(tmp_path_factory.mktemp("server")) as url:
+        yield url
+
+
+@contextmanager
+def dashboard(folder: Path, **variables: str) -> Iterator[str]:
+    """A dashboard of its own.
+
+    Args:
+        folder: For its log, and what it takes for the user's home.
+        variables: Of its environment.
+    """
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    log = tmp_path_factory.mktemp("server") / "log.txt"
+    log = folder / "log.txt"
     with log.open("wb") as out:
         server = subprocess.Popen(
             [sys.executable, "-m", "streamlit", "run", "app.py", "--server.port", str(port)],
             cwd=ROOT,
             stdout=out,
             stderr=subprocess.STDOUT,
-            env=os.environ | {"HOME": str(log.parent)},
+            env=os.environ | {"HOME": str(folder)} | variables,
         )
         try:
             url = f"http://127.0.0.1:{port}"

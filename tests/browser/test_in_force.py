@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 
 from playwright.sync_api import Browser, Locator, Page, expect
 
+from tests.browser.conftest import dashboard
 from tests.browser.walking import no_trace, parameters, rules_choice, settle, visit
 
 
@@ -127,3 +129,15 @@ def test_back_goes_through_what_was_on_screen_and_nothing_else(screen: Page) -> 
         assert screen.url == url
     expect(data_choice(screen)).to_have_value("Pendulum")
     no_trace(screen)
+
+
+def test_where_edits_cannot_be_kept_it_is_said(chromium: Browser, tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("no library")
+    with dashboard(tmp_path, SARL_LIBRARY=str(blocked)) as address:
+        context = chromium.new_context(base_url=address)
+        screen = context.new_page()
+        visit(screen, "/edit?data=cartpole", "Edit")
+        screen.get_by_role("button", name="Switch off").click()
+        expect(screen.get_by_test_id("stToast")).to_contain_text("kept for this visit only")
+        context.close()
