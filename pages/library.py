@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import streamlit as st
 
-from sarl_core.errors import SarlError
+from sarl_core.errors import InputError, SarlError
 from sarl_dashboard.state import library
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.library.chosen import show_chosen
@@ -16,7 +16,10 @@ try:
     opened = library.library()
     item = choose_item(opened, library.author())
     if item is not None:
-        show_chosen(opened, item, library.author())
+        try:
+            show_chosen(opened, item, library.author())
+        except InputError as error:  # as where its file is missing; the others are here
+            refuse(error)
     import_form(opened, library.author())
     removed_items(opened, library.author())
     room(opened, library.author())

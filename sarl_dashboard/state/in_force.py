@@ -15,6 +15,7 @@ from sarl_core.mining.editing.edits import Edit, History, check_edit
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.state import edits, library, rule_base
+from sarl_dashboard.state.data import data_problem
 from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, EDITED, IN_FORCE, UNEDITED
 from sarl_dashboard.state.thresholds import THRESHOLDS
@@ -31,9 +32,12 @@ def take_up() -> None:
     Once a run, before anything is drawn.
     """
     st.session_state.pop("_edits_changed", None)
-    rule_base.leave_what_is_of_other_data()
-    named = url_text("edits", "", lambda text: len(text) <= _LONGEST)
     st.session_state.pop("_edits_problem", None)
+    named = url_text("edits", "", lambda text: len(text) <= _LONGEST)
+    if data_problem():  # it is said on the page, and the address keeps what it names
+        rule_base.base_name()
+        return
+    rule_base.leave_what_is_of_other_data()
     if named == st.session_state.get("_edits_named", ""):
         name_edits()
         return
@@ -99,7 +103,7 @@ def go_on_without() -> None:
 
 def is_edited() -> bool:
     """Whether the rules in force have edits; nothing is mined to say that they have none."""
-    if not edits.any_made():
+    if not edits.any_made() or data_problem():
         return False
     try:
         key = rule_base.base_key(rule_base.base_name())

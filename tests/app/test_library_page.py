@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from sarl_core import load_demonstrations
+from sarl_core import load_demonstrations, mine_rules
 from sarl_core.errors import InputError
 from sarl_core.library import Library, Quota
-from sarl_core.library.contents import annotated_file, rules_of
+from sarl_core.library.contents import add_rules, annotated_file, rules_of
 from sarl_core.library.items import new_id
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_dashboard.state import library as state
@@ -105,6 +105,40 @@ def test_what_a_link_names_is_not_replaced_in_silence(page: str, missing: str, p
     assert any(says in one for one in errors(app)), errors(app)
     assert metrics(app) == {}
     assert app.query_params["data"] == name
+
+
+@pytest.mark.parametrize("named", [{"edits": "a" * 26}, {"set": "b" * 26}, {"edits": "x"}])
+def test_a_page_without_its_data_has_its_title_and_its_sidebar(named: dict[str, str]) -> None:
+    data = new_id()
+    app = open_page("rules", data=data, **named)
+    assert [one.value for one in app.title] == ["Rules"]
+    assert any("has nothing with the id" in one for one in errors(app))
+    assert app.selectbox(key="_data_choice").value == data
+    app.switch_page("library.py").run()
+    assert [one.value for one in app.title] == ["Library"]
+    assert not errors(app)
+    for name, value in named.items():
+        assert app.query_params[name] == value
+
+
+def test_the_list_stands_where_a_link_names_nothing_that_is_here() -> None:
+    upload(open_page("demonstrations"))
+    for named, says in ((new_id(), "has nothing with the id"), ("nonsense", "is no id")):
+        app = open_page("library", item=named)
+        assert any(says in one for one in errors(app)), errors(app)
+        assert "crane.csv" in app.dataframe[0].value["Name"].tolist()
+        assert "kept for this visit only" not in texts(app)
+
+
+def test_the_list_stands_where_the_file_of_one_thing_is_missing(place: Path) -> None:
+    with Library() as library:
+        rules = mine_rules(load_demonstrations(DATA / "cartpole.parquet"), supp_min=0, conf_min=1)
+        identifier = add_rules(library, rules, "mine", author="Ada").id
+    shutil.rmtree(place / "files")
+    app = open_page("library", item=identifier)
+    assert any("is missing from the library" in one for one in errors(app)), errors(app)
+    assert "Bring what was exported elsewhere" in [one.label for one in app.expander]
+    assert "kept for this visit only" not in texts(app)
 
 
 def test_without_a_library_everything_else_works(place: Path) -> None:

@@ -11,12 +11,11 @@ from pathlib import Path
 import pandas as pd
 import streamlit as st
 
-from sarl_core.errors import SarlError
+from sarl_core.errors import InputError, SarlError
 from sarl_core.library import Item, Library
 from sarl_core.library.bundles import ENDING, import_bundle
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.tables import table_height
-from sarl_dashboard.state.library import is_id
 from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import refuse
 
@@ -26,6 +25,7 @@ KINDS = {
     "result": "Result",
     "note": "Note",
 }
+_LONGEST = 200  # signs of a name in an address
 _FORMS = {
     ".csv": "a table",
     ".gif": "a film",
@@ -38,8 +38,13 @@ _FORMS = {
 
 def choose_item(opened: Library, author: str) -> Item | None:
     """The list; the thing that is chosen in it or that a link names, None where none is."""
-    named = url_text("item", "", lambda text: not text or is_id(text))
-    item = opened.item(named) if named else None
+    named = url_text("item", "", lambda text: len(text) <= _LONGEST)
+    item = None
+    if named:
+        try:
+            item = opened.item(named)
+        except InputError as error:  # all that is kept is still here
+            refuse(error)
     items = opened.items(author)
     if not items:
         st.info(
