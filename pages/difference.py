@@ -1,4 +1,4 @@
-"""Compare: two rule sets side by side, their rules and the states they decide differently."""
+"""Compare: two to five rule sets, their rules and the states they decide differently."""
 
 from __future__ import annotations
 
@@ -9,6 +9,6 @@ from sarl_dashboard.views.difference.comparison import comparison
 st.title("Compare")
 st.caption(
     "Two to five rule sets side by side: which rules differ, and on how many of the same states "
-    "they decide differently."
+    "two of them decide differently."
 )
 comparison()

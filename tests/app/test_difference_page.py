@@ -127,3 +127,22 @@ def test_every_rule_set_that_is_offered_is_explained() -> None:
     assert len(choice.options) > 5
     for name in choice.options:
         assert f"{name[0].upper()}{name[1:]}: " in choice.help
+
+
+def test_no_rules_are_no_set_to_compare() -> None:
+    app = open_page("difference", data="cartpole", sets="none|unfiltered|filtered")
+    assert "“none” is no rule set" in texts(app)
+    assert len(app.dataframe) > 1
+
+
+def test_rules_that_are_switched_off_count_for_nothing() -> None:
+    app = open_page("edit", data="cartpole")
+    app.button(key="edit_switch").click().run()
+    app.switch_page("difference.py").run()
+    before, after = app.dataframe[0].value.to_dict("records")
+    rules = mine_rules(CARTPOLE, supp_min=0.005, conf_min=0.95).rules
+    lengths = sorted(rule.length for rule in rules)
+    assert before["Mean length"] == pytest.approx(sum(lengths) / len(lengths))
+    assert after["Rules"] == before["Rules"] - 1
+    off = before["Mean length"] * before["Rules"] - after["Mean length"] * after["Rules"]
+    assert any(off == pytest.approx(length) for length in lengths)

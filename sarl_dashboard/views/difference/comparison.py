@@ -1,4 +1,4 @@
-"""What differs between two rule sets: rules, and decisions in the same states."""
+"""What differs between rule sets: two closely, rules and decisions in the same states."""
 
 from __future__ import annotations
 

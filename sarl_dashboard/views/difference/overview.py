@@ -32,7 +32,9 @@ def show_overview(sides: Sequence[Side], different: Callable[[Side, Side], float
             "Rules": column.NumberColumn(
                 format="localized", width="small", help="That are switched on"
             ),
-            "Mean length": column.NumberColumn(format="%.1f", width="small"),
+            "Mean length": column.NumberColumn(
+                format="%.1f", width=110, help="Of the rules that are switched on"
+            ),
             "Coverage": share,
             "Fidelity": share,
         },
@@ -50,10 +52,11 @@ def show_overview(sides: Sequence[Side], different: Callable[[Side, Side], float
 
 def _line(side: Side) -> dict[str, object]:
     verdicts = edits.verdicts_of_set(side.rule_set)
+    lengths = [rule.length for rule in side.rule_set.rules if rule.enabled]
     return {
         "Rule set": side.name,
-        "Rules": sum(rule.enabled for rule in side.rule_set.rules),
-        "Mean length": side.rule_set.mean_length,
+        "Rules": len(lengths),
+        "Mean length": sum(lengths) / max(len(lengths), 1),
         "Coverage": verdicts.coverage,
         "Fidelity": verdicts.fidelity,
     }

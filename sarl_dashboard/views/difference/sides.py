@@ -67,7 +67,9 @@ def chosen_sides() -> list[Side]:
         except SarlError as error:
             st.info(in_full(str(error)), icon=":material/link_off:")
             continue
-        assert rule_set is not None
+        if rule_set is None:
+            st.info(f"“{name}” is no rule set; choose others.", icon=":material/link_off:")
+            continue
         sides.append(Side(rule_set, stored.get(name, name)))
     return sides
 
