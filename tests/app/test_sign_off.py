@@ -57,8 +57,10 @@ def test_the_export_says_it_on_the_page_and_in_the_file() -> None:
     assert line.startswith("Approved by Eve on ")
     assert line.endswith(": held <b>against</b> the logs.")
     assert f"# {line}" in app.code[0].value
+    assert "before they were rounded" not in texts(app)
     app.toggle(key="rounded").set_value(True).run()  # other rules
     assert lines(app) == [NOBODY]
+    assert "What was approved are the rules before they were rounded" in texts(app)
 
 
 def test_the_audit_says_it() -> None:

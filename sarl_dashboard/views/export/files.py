@@ -90,6 +90,14 @@ def show_file(rule_set: RuleSet, settings: ExportSettings) -> None:
         st.caption(f"{form.meaning} {len(content) / 1024:,.1f} kB.")
     if sign_off is not None:
         st.caption(escaped(sign_off_text(sign_off)))
+        before = sign_off_here(settings.rule_set)
+        if before is not None and before.approvals and not sign_off.approvals:
+            st.info(
+                "What was approved are the rules before they were rounded or merged here: switch "
+                "“Round thresholds” and “Merge conditions” off to carry those away, or keep these "
+                "below and have them approved.",
+                icon=":material/verified:",
+            )
     if form.suffix == ".onnx":
         kind = "int64" if not rule_set.actions[0].is_interval else "float32"
         width = len(observed_features(rule_set.source.features))
