@@ -307,6 +307,13 @@ def test_what_cannot_be_learned_is_said_in_a_sentence(
     assert button(app, "run_learning") is None
 
 
+def test_without_demonstrations_one_is_sent_to_them() -> None:
+    app = own(data="upload")
+    assert not errors(app)
+    assert "Nothing has been uploaded in this session" in texts(app)
+    assert button(app, "run_learning") is None
+
+
 def test_without_a_way_to_learn_it_asks_for_one() -> None:
     app = own()
     app.pills(key="learn_arms").set_value([]).run()
