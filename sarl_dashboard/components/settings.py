@@ -31,7 +31,7 @@ from sarl_dashboard.state.rule_files import (
     compact_sets,
 )
 from sarl_dashboard.state.url import with_own
-from sarl_dashboard.text import in_full
+from sarl_dashboard.text import escaped, in_full
 
 OUTSIDE: tuple[Outside, ...] = get_args(Outside)
 RULE_SETS = (IN_FORCE, CHOSEN, *PAPERS, *COMPACT_ENDINGS, EDITED, UNEDITED)
@@ -122,9 +122,19 @@ def rule_set_choice(
         What it is called: of those in force, what they are.
     """
     offered = offered_rule_sets([name for name in (*RULE_SETS, *more) if name not in without])
+    named = st.query_params.get(key)
+    if key not in st.session_state and named is not None and named not in offered:
+        st.session_state[f"_{key}_unknown"] = named
+    if unknown := st.session_state.get(f"_{key}_unknown"):
+        st.warning(
+            f"There are no rules called “{escaped(unknown[:60])}” here, which the address names: "
+            "choose others below.",
+            icon=":material/link_off:",
+        )
     choice = st.selectbox(
         "Rules",
         offered,
+        on_change=lambda: st.session_state.pop(f"_{key}_unknown", None),
         key=key,
         bind="query-params",
         width=width,

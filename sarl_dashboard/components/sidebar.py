@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import streamlit as st
+from markupsafe import Markup
 
 from sarl_core.environments.formulas import Formula
 from sarl_core.errors import SarlError
@@ -21,6 +22,7 @@ from sarl_dashboard.state.data import (
     dataset_labels,
     uncombined_demonstrations,
 )
+from sarl_dashboard.state.rule_files import CHOSEN
 from sarl_dashboard.state.thresholds import (
     MIN_DIVIDER,
     choose_divider,
@@ -76,6 +78,8 @@ def require_rules(title: str) -> None:
         refuse(problem)
         _go_on_without(in_force.go_on_without)
         st.stop()
+    if in_force.kind() != CHOSEN:  # on a narrow screen, whose sidebar is folded
+        st.html(Markup('<p class="sarl-in-force">Rules: {}</p>').format(in_force.title()))
 
 
 def _go_on_without(leave: Callable[[], None]) -> None:

@@ -104,6 +104,9 @@ def choose_dataset(name: str) -> None:
     hold_out.leave_out(())
     combining.choose_all()
     set_url_choice("set", THRESHOLDS, THRESHOLDS)
+    for parameter in ("edits", "wording"):  # of other data, or of a link that named none
+        set_url_choice(parameter, "")
+        st.session_state[f"_{parameter}_named"] = ""
     set_url_choice("data", name, DEFAULT_DATA)
 
 

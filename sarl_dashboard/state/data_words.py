@@ -35,7 +35,7 @@ def take_up() -> None:
     raw = raw_demonstrations()
     if raw is None:
         return
-    if named and named != st.session_state.get("_names_named", ""):
+    if named and named != st.session_state.get("_wording_named", ""):
         try:
             _give(raw, named)
         except SarlError as error:
@@ -43,7 +43,7 @@ def take_up() -> None:
             return
     named = _name_of(raw)
     set_url_choice("wording", named)
-    st.session_state["_names_named"] = named
+    st.session_state["_wording_named"] = named
 
 
 def problem() -> str:
@@ -54,7 +54,7 @@ def problem() -> str:
 def go_on_without() -> None:
     """Leave names that cannot be had; for callbacks."""
     set_url_choice("wording", "")
-    st.session_state["_names_named"] = ""
+    st.session_state["_wording_named"] = ""
 
 
 def _give(raw: Demonstrations, named: str) -> None:

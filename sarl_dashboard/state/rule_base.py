@@ -99,13 +99,17 @@ def problem() -> str:
 
 
 def leave_what_is_of_other_data() -> None:
-    """Go back to the thresholds where a compact set of other data was chosen, and no link says it.
+    """Go back to the thresholds where a compact set was in force on data that were chosen before.
 
-    With other data chosen, there may be none of that name.
+    With other data chosen, there may be none of that name; that of a link is not left.
     """
-    name = base_name()
-    if name in COMPACT_ENDINGS and name not in compact_sets() and "set" not in st.query_params:
-        choose(THRESHOLDS)
+    name, data = base_name(), chosen_dataset()
+    before = st.session_state.get("_set_of", (data, name))
+    missing = name in COMPACT_ENDINGS and name not in compact_sets()
+    if missing and before[0] != data and before[1] == name:
+        choose()
+        name = THRESHOLDS
+    st.session_state["_set_of"] = (data, name)
 
 
 def base() -> Base:
@@ -198,7 +202,8 @@ def labels() -> dict[str, str]:
     for item in library.own_rules():
         if len(named) >= _MOST_LISTED:
             break
-        if item.id == chosen or (item.details.get("environment") or env_id) == env_id:
+        own = chosen_dataset() in item.came_from
+        if own or item.id == chosen or (item.details.get("environment") or "") == env_id:
             named[item.id] = _free(named, item.name, library_label(item.id))
     if chosen not in named:
         named[chosen] = _free(named, _name_of(chosen), f"{_name_of(chosen)} ({chosen[:26]})")

@@ -12,7 +12,15 @@ from sarl_core.library import Library
 from sarl_core.library.contents import add_rules
 from sarl_core.library.place import place_of, usual_author
 from sarl_core.mining.rule_set import RuleSet, rules_to_json
-from tests.app.screens import ROUTER, chosen_rules, errors, open_page, texts, upload_rules
+from tests.app.screens import (
+    ROUTER,
+    chosen_rules,
+    errors,
+    html,
+    open_page,
+    texts,
+    upload_rules,
+)
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 CARTPOLE = load_demonstrations(DATA / "cartpole.parquet")
@@ -198,3 +206,30 @@ def test_where_nothing_can_be_kept_edits_are_in_force_for_the_visit(
     upload_rules(app, "mine.json", rules_to_json(FILTERED).encode())
     assert address(app)["set"] == "own file"
     assert not errors(app)
+
+
+def test_a_page_s_own_choice_that_is_not_here_is_said() -> None:
+    app = open_page("export", data="cartpole", carry="nonsense")
+    assert any("no rules called “nonsense”" in str(one.value) for one in app.warning)
+    app.selectbox(key="carry").set_value("compact").run()
+    assert not app.warning
+
+
+def test_other_data_leave_rules_and_edits_that_are_not_theirs() -> None:
+    app = open_page("rules", data="cartpole", set="compact", edits="a" * 26)
+    assert errors(app)
+    app.selectbox(key="_data_choice").set_value("pendulum").run()
+    assert not errors(app)
+    assert chosen_rules(app) == AT_THRESHOLDS
+    assert not {"set", "edits"} & set(address(app))
+    app = open_page("rules", data="cartpole", set="compact")
+    app.query_params["data"] = "pendulum"  # by a link that names no rules
+    app.run()
+    assert not errors(app)
+    assert chosen_rules(app) == AT_THRESHOLDS
+
+
+def test_a_narrow_screen_is_told_which_rules_are_in_force() -> None:
+    assert "sarl-in-force" not in html(open_page("rules", data="cartpole"))
+    app = open_page("report", data="cartpole", set="compact")
+    assert '<p class="sarl-in-force">Rules: Compact rules</p>' in html(app)
