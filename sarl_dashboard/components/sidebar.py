@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import streamlit as st
-from markupsafe import Markup
 
 from sarl_core.environments.formulas import Formula
 from sarl_core.errors import SarlError
@@ -31,7 +30,7 @@ from sarl_dashboard.state.thresholds import (
     chosen_thresholds,
 )
 from sarl_dashboard.state.url import say_in_url
-from sarl_dashboard.text import refuse
+from sarl_dashboard.text import escaped, refuse
 
 
 def threshold_parameters() -> dict[str, str | None]:
@@ -79,7 +78,8 @@ def require_rules(title: str) -> None:
         _go_on_without(in_force.go_on_without)
         st.stop()
     if in_force.kind() != CHOSEN:  # on a narrow screen, whose sidebar is folded
-        st.html(Markup('<p class="sarl-in-force">Rules: {}</p>').format(in_force.title()))
+        with st.container(key="rules_in_force"):
+            st.caption(f"Rules: {escaped(in_force.title())}")
 
 
 def _go_on_without(leave: Callable[[], None]) -> None:
