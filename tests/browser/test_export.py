@@ -15,10 +15,17 @@ from tests.browser.walking import metric, no_trace, parameters, settle, visit
 def type_name(screen: Page, row: int, name: str) -> None:
     """Type into the first column of the first table, whose cells are painted, not elements."""
     table = screen.get_by_test_id("stDataFrame").first
-    table.click(position={"x": 120, "y": 50 + 33 * row})
-    screen.wait_for_timeout(300)  # for the cell to be the chosen one
-    screen.keyboard.press("x")  # opens a field to type in
     field = screen.locator(".gdg-input")
+    for _ in range(
+        5
+    ):  # a page that runs again, as for what came of work beside it, forgets the cell
+        table.click(position={"x": 120, "y": 50 + 33 * row})
+        screen.wait_for_timeout(300)  # for the cell to be the chosen one
+        screen.keyboard.press("x")  # opens a field to type in
+        screen.wait_for_timeout(500)
+        if field.is_visible():
+            break
+        settle(screen)
     expect(field).to_be_visible()
     field.fill(name)
     field.press("Enter")
