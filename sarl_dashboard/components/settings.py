@@ -11,10 +11,9 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Outside
 from sarl_dashboard.components.journey.words import with_words
-from sarl_dashboard.state import in_force
+from sarl_dashboard.state import in_force, rule_base
 from sarl_dashboard.state.agents import FRESH_SEED, PROJECTIONS, PolicyFile, policy_upload
 from sarl_dashboard.state.environments import AS_DEMONSTRATED, continuous, usual_environments
-from sarl_dashboard.state.rule_choice import edits_offered
 from sarl_dashboard.state.rule_files import (
     CHOSEN,
     COMBINED,
@@ -88,7 +87,7 @@ def environment_choice() -> str | None:
 def offered_rule_sets(names: Sequence[str]) -> list[str]:
     """Those of some rule sets that can be had now."""
     missing = COMPACT_ENDINGS.keys() - compact_sets()
-    edited = edits_offered()
+    edited = in_force.edits_made(rule_base.base_name()) > 0
     return [
         name for name in names if name not in missing and (name not in (EDITED, UNEDITED) or edited)
     ]

@@ -129,7 +129,7 @@ def rules() -> RuleSet:
 
 def count() -> int:
     """How many edits the rules in force have."""
-    return _count(rule_base.base_name()) if is_edited() else 0
+    return edits_made(rule_base.base_name()) if is_edited() else 0
 
 
 def address_of(choice: str) -> dict[str, str] | None:
@@ -199,7 +199,7 @@ def options() -> dict[str, str]:
     """What may be in force, and what it is called: rules, and the same with the edits made here."""
     named: dict[str, str] = {}
     for name, label in rule_base.labels().items():
-        count = _count(name)
+        count = edits_made(name)
         if count:
             named[_edited_option(name)] = f"{label}, with {counted(count, 'edit')}"
             label = f"{label}, unedited"
@@ -232,7 +232,8 @@ def _edited_option(name: str) -> str:
     return f"{name}{_WITH_EDITS}"
 
 
-def _count(name: str) -> int:
+def edits_made(name: str) -> int:
+    """How many edits there are of some rules, in force or set aside."""
     if not edits.any_made():
         return 0
     try:

@@ -66,14 +66,3 @@ def edited_rules() -> RuleSet:
     if not edits.history(of).edits:
         raise InputError("there are no edits of the rules in force; make some on the Edit page")
     return edits.edited(of)
-
-
-def edits_offered() -> bool:
-    """Whether there is an edited set to choose."""
-    if not edits.any_made():
-        return False
-    try:
-        key = rule_base.base_key(rule_base.base_name())
-    except InputError:
-        return False
-    return bool(edits.history_of(key).edits)

@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from sarl_core.library import Item, Library
 from sarl_core.library.results import add_result
-from sarl_dashboard.state import library as state
 from tests.app.screens import errors, open_page, run_through, texts
 
-
-@pytest.fixture(autouse=True)
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A library of this test's own."""
-    monkeypatch.setenv("SARL_LIBRARY", str(tmp_path / "library"))
-    monkeypatch.setenv("SARL_AUTHOR", "Ada")
-    yield
-    for opened in state._OPENED.values():
-        opened.close()
-    state._OPENED.clear()
+pytestmark = pytest.mark.usefixtures("place")
 
 
 def results() -> list[Item]:

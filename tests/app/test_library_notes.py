@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,22 +11,13 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core.library import Item, Library
 from sarl_core.library.results import add_note, add_result, note_text, notes_about
-from sarl_dashboard.state import library as state
 from sarl_dashboard.views.library import contents
 from tests.app.screens import errors, html, open_page, texts
 
 SCRIPT = "<script>alert(1)</script> *not* `so`"
 
 
-@pytest.fixture(autouse=True)
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A library of this test's own."""
-    monkeypatch.setenv("SARL_LIBRARY", str(tmp_path / "library"))
-    monkeypatch.setenv("SARL_AUTHOR", "Ada")
-    yield tmp_path / "library"
-    for opened in state._OPENED.values():
-        opened.close()
-    state._OPENED.clear()
+pytestmark = pytest.mark.usefixtures("place")
 
 
 @pytest.fixture

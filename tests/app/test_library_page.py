@@ -6,7 +6,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -25,15 +24,7 @@ DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 ROWS = b"obs_speed,action,episode\n0.5,0,0\n1.5,1,0\n0.25,0,1\n2.5,1,1\n0.1,0,1\n"
 
 
-@pytest.fixture(autouse=True)
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A library of this test's own."""
-    monkeypatch.setenv("SARL_LIBRARY", str(tmp_path / "library"))
-    monkeypatch.setenv("SARL_AUTHOR", "Ada")
-    yield tmp_path / "library"
-    for opened in state._OPENED.values():
-        opened.close()
-    state._OPENED.clear()
+pytestmark = pytest.mark.usefixtures("place")
 
 
 def upload(app: AppTest, content: bytes = ROWS, name: str = "crane.csv") -> str:

@@ -129,7 +129,7 @@ def test_all_pages_are_in_the_order_that_is_chosen(
 ) -> None:
     app = turn(open_page("rules", **UNFILTERED), 3)
     app.selectbox(key="order").select(order).run()
-    wanted = [rules.name_of(rule) for rule in sorted(ordered, key=measure)]  # type: ignore[arg-type]
+    wanted = [rules.name_of(rule) for rule in sorted(ordered, key=measure)]
     assert names(app) == wanted[:ROWS]
     assert names(turn(app, 2)) == wanted[ROWS : 2 * ROWS]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,7 +11,6 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import RuleSet
 from sarl_core.library import Library
 from sarl_core.library.contents import add_rules
-from sarl_dashboard.state import library as state
 from sarl_dashboard.state.rule_files import CHOSEN
 from tests.app.screens import ROUTER, open_page, run_through, texts
 
@@ -22,15 +20,7 @@ NOBODY = "Not approved by anybody."
 COMBINED = "compact, two features"
 
 
-@pytest.fixture(autouse=True)
-def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A library of this test's own."""
-    monkeypatch.setenv("SARL_LIBRARY", str(tmp_path / "library"))
-    monkeypatch.setenv("SARL_AUTHOR", "Ada")
-    yield tmp_path / "library"
-    for opened in state._OPENED.values():
-        opened.close()
-    state._OPENED.clear()
+pytestmark = pytest.mark.usefixtures("place")
 
 
 def approve() -> None:
