@@ -14,13 +14,13 @@ from .explaining.report.report import make_report as make_report
 from .mining.algorithm_1 import mine_rules as mine_rules
 from .mining.classifier import RuleClassifier as RuleClassifier
 from .mining.combining.choice import with_combinations as with_combinations
+from .mining.growing.growth import grow_policy_trees as grow_policy_trees
 from .mining.rule_set import RuleSet as RuleSet
 from .mining.rule_set import load_rules as load_rules
 from .mining.rules import Rule as Rule
 from .mining.thresholds.landscape import Landscape as Landscape
 from .mining.thresholds.landscape import threshold_landscape as threshold_landscape
 from .mining.tree import PolicyTree as PolicyTree
-from .mining.tree import grow_policy_trees as grow_policy_trees
 from .rendering.replay import render_episode as render_episode
 from .rollouts.episodes import Episodes as Episodes
 from .rollouts.episodes import rollout as rollout

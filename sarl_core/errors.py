@@ -15,6 +15,7 @@ _EXTRAS = {
     "streamlit": "dashboard",
     "stable_baselines3": "learning",
     "torch": "learning",
+    "sklearnex": "large",
     "imageio": "video",
     "imageio_ffmpeg": "video",
 }
@@ -55,11 +56,12 @@ def needing_extras() -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        extra = _EXTRAS.get(error.name or "")
+        package = (error.name or "").partition(".")[0]
+        extra = _EXTRAS.get(package)
         if extra is None:
             raise
         raise WorkError(
-            f"this needs {error.name}, which is not installed; run pip install "
+            f"this needs {package}, which is not installed; run pip install "
             f"'sarl-explorer[{extra}]'"
         ) from error
 

@@ -52,6 +52,7 @@ def pins(name: str) -> dict[str, str]:
     found = {}
     for line in (ROOT / name).read_text().splitlines():
         line = line.split("#")[0].strip()
+        line = re.sub(r"; platform_machine in [\"'][\w ]+[\"']$", "", line)
         if line and not line.startswith("-r "):
             match = re.fullmatch(r"([A-Za-z0-9_.-]+)(?:\[[a-z0-9,]+\])?==([0-9][0-9a-z.]*)", line)
             assert match, f"{line!r} in {name} is no exact pin"

@@ -230,8 +230,8 @@ def landscape(
             parse_grid,
             save_landscape,
         )
+        from sarl_core.mining.growing.growth import grow_policy_trees
         from sarl_core.mining.thresholds.landscape import threshold_landscape
-        from sarl_core.mining.tree import grow_policy_trees
 
         grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
         recorded = read_demonstrations(files, env, columns, missing)

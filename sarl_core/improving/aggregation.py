@@ -32,8 +32,9 @@ from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.combining.queries import trees_over_used
 from sarl_core.mining.envelope import with_boxes
+from sarl_core.mining.growing.structure import count_tree
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.tree import PolicyTree, count_tree
+from sarl_core.mining.tree import PolicyTree
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rollouts import seeds
 from sarl_core.rollouts.choices import check_choice, mean_score, scores

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.requirements import LARGEST
 from sarl_core.mining.budgeted_trees import without_idle_queries
+from sarl_core.mining.growing.structure import TreeStructure
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.tree import LEAF, TreeStructure
+from sarl_core.mining.tree import LEAF
 
 _TURNS = 10
 _FEWEST = 20  # states of a leaf that a query may be looked for in

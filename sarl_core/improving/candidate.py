@@ -15,7 +15,8 @@ from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
 from sarl_core.mining.combining.queries import over_queried
-from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
+from sarl_core.mining.growing.structure import TreeStructure, count_tree
+from sarl_core.mining.tree import LEAF, PolicyTree
 from sarl_core.processes import run_each
 from sarl_core.progress import Progress
 from sarl_core.rollouts.choices import weighed

@@ -19,7 +19,8 @@ from sarl_core.demonstrations.derived import LARGEST_RATIO, Combination, Derived
 from sarl_core.improving.candidate import Candidate
 from sarl_core.mining.combining.candidates import rounded_ratio
 from sarl_core.mining.combining.queries import with_ratios
-from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure
+from sarl_core.mining.growing.structure import TreeStructure
+from sarl_core.mining.tree import LEAF, PolicyTree
 
 POPULATION = 20  # neighbours a generation
 

@@ -26,7 +26,8 @@ from sarl_core.improving.shapes import MetStates, neighbours
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
 from sarl_core.mining.budgeted_trees import leaf_rules
 from sarl_core.mining.combining.candidates import Pair, candidates
-from sarl_core.mining.tree import PolicyTree, count_tree
+from sarl_core.mining.growing.structure import count_tree
+from sarl_core.mining.tree import PolicyTree
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, rollout

@@ -26,8 +26,9 @@ from sarl_core.improving.alternation import (
     without_query,
 )
 from sarl_core.improving.candidate import Candidate, structure_of
+from sarl_core.mining.growing.structure import TreeStructure
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure
+from sarl_core.mining.tree import LEAF, PolicyTree
 
 _AT_ONCE = 2  # queries of a place before the other places have their turn
 _OFFERED = 0.6  # of the features to each place, so that not the same ones are always first

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.envelope import with_boxes
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Operator, Rule, Thresholds
 from sarl_core.mining.thresholds.landscape import confidence_above
-from sarl_core.mining.tree import PolicyTree, grow_policy_trees, several_trees, source_of
+from sarl_core.mining.tree import PolicyTree, several_trees, source_of
 
 
 def cut_nodes(

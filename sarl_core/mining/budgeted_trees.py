@@ -15,17 +15,12 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import rules_at
+from sarl_core.mining.growing.exact import fitted
+from sarl_core.mining.growing.structure import TreeStructure, count_tree
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
-from sarl_core.mining.tree import (
-    LEAF,
-    PolicyTree,
-    TreeStructure,
-    count_tree,
-    fitted,
-    source_of,
-)
+from sarl_core.mining.tree import LEAF, PolicyTree, source_of
 
 MIN_RULES = 2
 _LEAST_PAIRS = 5  # a mean of fewer values is no mean

@@ -16,9 +16,9 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.edit_counts import reading_order
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.language import conditions_text, counted, share_text
 from sarl_core.mining.rules import node_of
-from sarl_core.mining.tree import grow_policy_trees
 
 
 class RuleClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]  # no types there

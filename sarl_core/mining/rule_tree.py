@@ -14,10 +14,11 @@ import numpy as np
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.recoding import recoded
 from sarl_core.errors import InputError
+from sarl_core.mining.growing.structure import TreeStructure, count_tree
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, node_of
-from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
+from sarl_core.mining.tree import LEAF, PolicyTree
 
 NO_RULE = -1
 

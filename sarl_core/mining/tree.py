@@ -1,38 +1,31 @@
-"""Growing a decision tree and reading it, once, into neutral and immutable arrays.
+"""A decision tree as neutral and immutable arrays, whichever learner grew it.
 
-Nothing outside this file touches scikit-learn's tree, so that another learner can hand over the
-same type. The demonstrations are kept in the order of the leaves, which makes the rows that reach
-a node a slice.
+The demonstrations are kept in the order of the leaves, which makes the rows that reach a node a
+slice.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from itertools import pairwise
-from numbers import Integral
-from typing import Any
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.arrays import make_read_only
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
-from sarl_core.demonstrations.requirements import LARGEST
 from sarl_core.demonstrations.splits import Splits
-from sarl_core.errors import InputError, quoted, require
-from sarl_core.mining.labels import LabelledDimension, label_dimensions
+from sarl_core.errors import require
+from sarl_core.mining.labels import LabelledDimension
 
 LEAF = -1
 
-_SMALL = 2.0**-10  # a feature with no larger spread is multiplied before a tree is grown
-_CROWDED = 1e-6  # and one of which half of the values lie as close together
-_SCALED_TO = 20  # the power of two that spreads are brought to
-_LARGEST_EXPONENT = 126  # of a float32, with some room
-_LOOKED_AT = 1_000
+Learner = Literal["exact", "histogram"]
+"""What chose the queries of a tree: all borders between two values, or those of bins."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +105,7 @@ class PolicyTree:
             where several are, unless the tree was improved by what it achieves.
         number: What stands in the id of a rule cut at each node, (n,) int64: its place, unless a
             part of the tree was regrown; the other nodes then keep theirs.
+        learner: What chose its queries.
     """
 
     index: int
@@ -130,6 +124,7 @@ class PolicyTree:
     demonstrated: NDArray[np.int64] | NDArray[np.float32]
     label: NDArray[np.int64]
     number: NDArray[np.int64]
+    learner: Learner = "exact"
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -356,211 +351,3 @@ def several_trees(
     if not isinstance(trees, (list, tuple)) or not all(isinstance(t, PolicyTree) for t in trees):
         require(trees, PolicyTree, must, advice)
     return tuple(trees)
-
-
-def grow_policy_trees(
-    demonstrations: Demonstrations,
-    *,
-    divider: int = 2,
-    max_depth: int | None = None,
-    seed: int = 0,
-) -> tuple[PolicyTree, ...]:
-    """Grow one CART tree an action dimension (the paper's "Derive Safety Rules").
-
-    Args:
-        demonstrations: N pairs.
-        divider: Number of intervals of each continuous dimension.
-        max_depth: Of the trees; None grows them fully. A limit can also be set afterwards,
-            at the thresholds, without growing anything again.
-        seed: For choosing among equally good queries.
-
-    Returns:
-        One tree an action dimension.
-
-    Raises:
-        InputError: If the divider or the depth is out of range.
-    """
-    from loky import cpu_count
-    from sklearn.tree import DecisionTreeClassifier
-
-    must = "what trees are grown from must be Demonstrations"
-    require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
-    if max_depth is not None and not (isinstance(max_depth, Integral) and max_depth >= 1):
-        raise InputError(f"the maximum depth is {quoted(max_depth)}; give 1 or more, or none")
-    dimensions = label_dimensions(demonstrations, divider)
-
-    def grown(index: int) -> PolicyTree:
-        labels = dimensions[index].labels_of(demonstrations.action_columns[:, index])
-        learner = DecisionTreeClassifier(criterion="gini", max_depth=max_depth, random_state=seed)
-        structure = fitted(learner, demonstrations.observations, labels)
-        return count_tree(structure, demonstrations, index, divider=divider)
-
-    if len(dimensions) == 1:
-        return (grown(0),)
-    # scikit-learn lets other threads run while it grows a tree.
-    with ThreadPoolExecutor(min(len(dimensions), cpu_count())) as threads:
-        return tuple(threads.map(grown, range(len(dimensions))))
-
-
-@dataclass(frozen=True, eq=False)
-class TreeStructure:
-    """The queries of a tree with n nodes, the root first, and what its nodes say.
-
-    Attributes:
-        feature: Feature queried at each node, (n,) int64; `LEAF` at leaves.
-        threshold: A state goes left where ``x[feature] <= threshold``, (n,) float64.
-        children_left: Node number of the left child, (n,) int64, `LEAF` at leaves.
-        children_right: Node number of the right child, (n,) int64, `LEAF` at leaves.
-        label: What each node says, (n,) int64, -1 for the most frequent label; None for that
-            everywhere.
-    """
-
-    feature: NDArray[np.int64]
-    threshold: NDArray[np.float64]
-    children_left: NDArray[np.int64]
-    children_right: NDArray[np.int64]
-    label: NDArray[np.int64] | None = None
-
-    def apply(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
-        """The leaf that each state reaches, (B,), as `PolicyTree.apply`."""
-        return walk(
-            observations, self.feature, self.threshold, self.children_left, self.children_right
-        )
-
-
-def fitted(
-    learner: Any,
-    observations: NDArray[np.float32],
-    targets: NDArray[Any],
-    weights: NDArray[np.float64] | None = None,
-) -> TreeStructure:
-    """Fit a tree of scikit-learn to states of any scale, and read its queries.
-
-    scikit-learn takes values within 1e-7 of each other for equal. Features that small are grown on
-    multiplied by a power of two, which is exact, and so are the thresholds on the way back: the
-    tree splits the states themselves as it split their multiples.
-
-    Args:
-        learner: A `DecisionTreeClassifier` or `DecisionTreeRegressor`; it is fitted.
-        observations: Shape (N, d), float32.
-        targets: Labels (N,), or values (N,) or (N, k).
-        weights: Of the pairs, (N,), or None.
-
-    Returns:
-        Its queries, without labels.
-    """
-    # A formula may be infinite, which scikit-learn refuses; thresholds lie below the limit.
-    if observations.max() > LARGEST or observations.min() < -LARGEST:
-        observations = np.clip(observations, -LARGEST, LARGEST)
-    exponents = _exponents(observations)
-    states = np.ldexp(observations, exponents) if exponents.any() else observations
-    learner.fit(states, targets, sample_weight=weights)
-    tree = learner.tree_
-    left = np.asarray(tree.children_left, dtype=np.int64)
-    feature = np.where(left == LEAF, LEAF, tree.feature).astype(np.int64)
-    threshold = np.array(tree.threshold, dtype=np.float64)
-    inner = feature != LEAF
-    threshold[inner] = np.ldexp(threshold[inner], -exponents[feature[inner]])
-    return TreeStructure(
-        feature=feature,
-        threshold=threshold,
-        children_left=left,
-        children_right=np.asarray(tree.children_right, dtype=np.int64),
-    )
-
-
-def _exponents(observations: NDArray[np.float32]) -> NDArray[np.int64]:
-    """By which powers of two features are multiplied, (d,); 0 for those of a usual scale."""
-    low, high = observations.min(axis=0), observations.max(axis=0)
-    width = high.astype(np.float64) - low
-    # An outlier may hide how small the others are; some rows are enough to see it.
-    some = np.sort(observations[:: max(1, len(observations) // _LOOKED_AT)].astype(np.float64), 0)
-    half = len(some) // 2
-    dense = (some[half:] - some[: len(some) - half]).min(axis=0)
-    width = np.where((dense > 0) & (dense < _CROWDED), dense, width)
-    small = (width > 0) & (width < _SMALL)
-    exponents = np.zeros(observations.shape[1], dtype=np.int64)
-    wanted = _SCALED_TO - np.frexp(width[small])[1]
-    most = np.frexp(np.maximum(np.abs(low[small]), np.abs(high[small])))[1]
-    exponents[small] = np.clip(wanted, 0, _LARGEST_EXPONENT - most)
-    return exponents
-
-
-def count_tree(
-    structure: TreeStructure, demonstrations: Demonstrations, index: int, *, divider: int
-) -> PolicyTree:
-    """Send demonstrations down a tree and count what the expert did at every node.
-
-    Args:
-        structure: Its queries, over the demonstrations' features.
-        demonstrations: N pairs.
-        index: Which action dimension.
-        divider: Number of intervals of continuous dimensions.
-
-    Returns:
-        The tree.
-
-    Raises:
-        InputError: If the divider is out of range.
-    """
-    dimension = label_dimensions(demonstrations, divider)[index]
-    demonstrated = demonstrations.action_columns[:, index].copy()
-    labels = dimension.labels_of(demonstrated)
-    left, right = structure.children_left, structure.children_right
-    levels = _levels(left, right)
-    n = len(left)
-    parent = np.full(n, -1, dtype=np.int64)
-    depth = np.zeros(n, dtype=np.int64)
-    leaves = structure.apply(demonstrations.observations)
-    # Counted here, since scikit-learn keeps fractions and the positions of the labels it saw.
-    counts = np.bincount(
-        leaves * dimension.n_labels + labels, minlength=n * dimension.n_labels
-    ).reshape(n, dimension.n_labels)
-    for number, level in enumerate(levels):
-        depth[level] = number
-        inner = level[left[level] != LEAF]
-        parent[left[inner]] = inner
-        parent[right[inner]] = inner
-    for level in reversed(levels):
-        inner = level[left[level] != LEAF]
-        counts[inner] = counts[left[inner]] + counts[right[inner]]
-    samples = counts.sum(axis=1)
-    frequent = counts.argmax(axis=1).astype(np.int64)
-    start = np.zeros(n, dtype=np.int64)
-    for level in levels:
-        inner = level[left[level] != LEAF]
-        start[left[inner]] = start[inner]
-        start[right[inner]] = start[inner] + samples[left[inner]]
-    return PolicyTree(
-        index=index,
-        dimension=dimension,
-        divider=int(divider),
-        source=Source.of(demonstrations).with_splits(
-            splits_of(structure.feature, structure.threshold, demonstrations)
-        ),
-        feature=structure.feature,
-        threshold=structure.threshold,
-        children_left=left,
-        children_right=right,
-        parent=parent,
-        depth=depth,
-        counts=counts.astype(np.int64),
-        # Stable, so that the rows of a leaf keep their order in time.
-        sample_order=np.argsort(start[leaves], kind="stable").astype(np.int64),
-        sample_start=start,
-        demonstrated=demonstrated,
-        label=(
-            frequent
-            if structure.label is None
-            else np.where(structure.label < 0, frequent, structure.label)
-        ),
-        number=np.arange(n, dtype=np.int64),
-    )
-
-
-def _levels(left: NDArray[np.int64], right: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Node numbers, one array a depth, the root first."""
-    levels = [np.zeros(1, dtype=np.int64)]
-    while len(inner := levels[-1][left[levels[-1]] != LEAF]):
-        levels.append(np.concatenate([left[inner], right[inner]]))
-    return levels

@@ -20,9 +20,10 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import load_demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import NAMED_SETTINGS
-from sarl_core.mining.tree import PolicyTree, grow_policy_trees
+from sarl_core.mining.tree import PolicyTree
 from sarl_core.rollouts.recording import SHIPPED, SHIPPED_STEPS, record
 from sarl_core.rollouts.seeds import (
     DEMONSTRATED,

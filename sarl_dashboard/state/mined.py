@@ -11,11 +11,12 @@ from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.editing.renaming import renamed_trees
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.evidence import EpisodeCounts
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import Landscape, threshold_landscape
 from sarl_core.mining.thresholds.pareto import ParetoPoint, pareto_front
-from sarl_core.mining.tree import PolicyTree, grow_policy_trees
+from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.holding_out import count_held_out, with_held_out
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.data import chosen_demonstrations, data_parts

@@ -10,7 +10,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import Demonstrations, load_demonstrations
 from sarl_core.explaining.words.cross_fit import no_recommendation_text, recommendation_sentences
-from sarl_core.mining.tree import grow_policy_trees
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.validation.cross_fitting import cross_fit
 from sarl_core.mining.validation.recommendation import Recommendation, recommended
 from tests.app.screens import ROUTER, metrics, open_page, texts

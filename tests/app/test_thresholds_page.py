@@ -6,9 +6,9 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules, threshold_landscape
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.language import share_text
 from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
-from sarl_core.mining.tree import grow_policy_trees
 from tests.app.screens import ROUTER, metrics, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"

@@ -16,9 +16,9 @@ from sarl_core.explaining.report.rules import in_order, rules_part
 from sarl_core.explaining.report.tally import tally
 from sarl_core.explaining.tables.rule_evidence import example_columns
 from sarl_core.explaining.words.replay import state_rows
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.rules import Condition, Rule
-from sarl_core.mining.tree import grow_policy_trees
 
 
 def demonstrated(n: int = 5_000) -> Demonstrations:

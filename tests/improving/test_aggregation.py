@@ -18,9 +18,9 @@ from sarl_core.improving.candidate import structure_of
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import ask, importance, scores
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
+from sarl_core.mining.growing.structure import count_tree
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
-from sarl_core.mining.tree import count_tree
 from sarl_core.rollouts.episodes import rollout
 from sarl_core.rollouts.seeds import REPORT, ROUNDS
 from sarl_core.rollouts.trial import make_agent

@@ -22,8 +22,9 @@ from sarl_core.improving.alternation import (
 )
 from sarl_core.improving.candidate import structure_of
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees
+from sarl_core.mining.growing.structure import TreeStructure
 from sarl_core.mining.labels import label_dimensions
-from sarl_core.mining.tree import LEAF, TreeStructure
+from sarl_core.mining.tree import LEAF
 
 
 def shown(seed: int, states: int = 60, labels: int = 3) -> Demonstrations:

@@ -17,7 +17,8 @@ from sarl_core.improving.refinement import Refinement, refinement_cost, refineme
 from sarl_core.improving.shapes import MetStates, neighbours
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.combining.candidates import pairs_of_like_kind
-from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
+from sarl_core.mining.growing.structure import TreeStructure, count_tree
+from sarl_core.mining.tree import LEAF, PolicyTree
 from sarl_core.progress import CancelledError
 from sarl_core.rollouts.choices import mean_score, scores, weighed
 from sarl_core.rollouts.episodes import Episodes, rollout

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, Shield
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules, without_idle_queries
+from sarl_core.mining.growing.structure import TreeStructure
 from sarl_core.mining.rule_tree import recount
-from sarl_core.mining.tree import LEAF, TreeStructure
+from sarl_core.mining.tree import LEAF
 from tests.mining.strategies import labelled_states
 
 

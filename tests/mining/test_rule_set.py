@@ -192,6 +192,7 @@ def test_whatever_changes_in_a_tree_changes_its_digest(
         "dimension": replace(tree.dimension, name="x"),
         "divider": 3,
         "source": replace(tree.source, digest="x"),
+        "learner": "histogram",
     }.get(name)
     if changed is None:
         changed = value.copy()

@@ -33,9 +33,10 @@ from sarl_core.files import as_path, whole_file
 from sarl_core.mining.combining.choice import pairs_chosen_from
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.language import counted, merged_length, share_text
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.tree import PolicyTree, grow_policy_trees
+from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import cross_fit
 from sarl_core.progress import Progress
 from sarl_core.rendering.example_frames import (

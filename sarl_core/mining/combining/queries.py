@@ -10,7 +10,8 @@ import numpy as np
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import Combination, DerivedFeature
 from sarl_core.mining.combining.candidates import rounded_ratio
-from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree
+from sarl_core.mining.growing.structure import TreeStructure, count_tree
+from sarl_core.mining.tree import LEAF, PolicyTree
 
 
 def with_ratios(

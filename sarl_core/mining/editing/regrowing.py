@@ -20,8 +20,10 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, quoted
 from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.editing.edits import Edit, Regrow
+from sarl_core.mining.growing.growth import part_of_tree
+from sarl_core.mining.growing.structure import TreeStructure, count_tree
 from sarl_core.mining.rules import FIRST_REGROWN, LAST_REGROWN, Thresholds
-from sarl_core.mining.tree import LEAF, PolicyTree, TreeStructure, count_tree, fitted
+from sarl_core.mining.tree import LEAF, PolicyTree
 
 MOST_QUERIES = 8
 
@@ -75,7 +77,8 @@ def next_queries(
         queries.append(_query(states, labels, feature, threshold)._replace(current=True))
     others = []
     for feature in range(states.shape[1]) if len({*labels.tolist()}) > 1 else ():
-        stump = fitted(_learner(max_depth=1), states[:, [feature]], labels)
+        column = states[:, [feature]]
+        stump = part_of_tree(column, labels, learner=tree.learner, max_depth=1)
         if stump.feature[0] != LEAF:
             others.append(_query(states, labels, feature, float(stump.threshold[0])))
     asks_now = [(one.feature, one.threshold) for one in queries]
@@ -134,12 +137,15 @@ def regrown(
         )
     labels = _labels(tree, demonstrations)
     parts = [
-        fitted(_learner(), demonstrations.observations[side], labels[side])
+        part_of_tree(demonstrations.observations[side], labels[side], learner=tree.learner)
         for side in (rows[left], rows[~left])
     ]
     structure, number = _joined(tree, place, below, (feature, float(threshold)), parts)
     return replace(
-        count_tree(structure, demonstrations, tree.index, divider=tree.divider), number=number
+        count_tree(
+            structure, demonstrations, tree.index, divider=tree.divider, learner=tree.learner
+        ),
+        number=number,
     )
 
 
@@ -250,13 +256,6 @@ def _place_of(tree: PolicyTree, node: int, demonstrations: Demonstrations) -> in
 def _labels(tree: PolicyTree, demonstrations: Demonstrations) -> NDArray[np.int64]:
     values = demonstrations.action_columns[:, tree.index]
     return np.asarray(tree.dimension.labels_of(values), dtype=np.int64)
-
-
-def _learner(max_depth: int | None = None) -> Any:
-    """As `grow_policy_trees` has it."""
-    from sklearn.tree import DecisionTreeClassifier
-
-    return DecisionTreeClassifier(criterion="gini", max_depth=max_depth, random_state=0)
 
 
 def _query(

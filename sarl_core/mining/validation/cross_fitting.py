@@ -24,9 +24,10 @@ from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.combining.candidates import Pair
 from sarl_core.mining.combining.choice import chosen_again
 from sarl_core.mining.evidence import EpisodeCounts, HeldOut, held_out_of
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
-from sarl_core.mining.tree import PolicyTree, grow_policy_trees
+from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.episode_counts import Influence, count_nodes, most_influential
 from sarl_core.processes import run_each
 from sarl_core.progress import Progress

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.rules import Thresholds
-from sarl_core.mining.tree import grow_policy_trees
 from sarl_core.mining.validation.cross_fitting import judge
 from sarl_core.mining.validation.episode_counts import count_rules
 from sarl_core.processes import run_each

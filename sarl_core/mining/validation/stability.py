@@ -17,10 +17,10 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.applications import Applications, applications
+from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Operator, Rule
-from sarl_core.mining.tree import grow_policy_trees
 from sarl_core.processes import run_each
 from sarl_core.progress import Progress
 

@@ -1,0 +1,1 @@
+"""Learners of trees, which all give queries of one kind, and what is counted at their nodes."""

@@ -1,0 +1,137 @@
+"""The queries of a tree, whichever learner chose them, and the demonstrations sent down them.
+
+A learner chooses queries; supports and confidences are counted here, of all demonstrations, by the
+comparison that shield and exports make. So they are exact, whatever the learner saw.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.labels import label_dimensions
+from sarl_core.mining.tree import LEAF, Learner, PolicyTree, Source, splits_of, walk
+
+
+@dataclass(frozen=True, eq=False)
+class TreeStructure:
+    """The queries of a tree with n nodes, the root first, and what its nodes say.
+
+    Attributes:
+        feature: Feature queried at each node, (n,) int64; `LEAF` at leaves.
+        threshold: A state goes left where ``x[feature] <= threshold``, (n,) float64.
+        children_left: Node number of the left child, (n,) int64, `LEAF` at leaves.
+        children_right: Node number of the right child, (n,) int64, `LEAF` at leaves.
+        label: What each node says, (n,) int64, -1 for the most frequent label; None for that
+            everywhere.
+    """
+
+    feature: NDArray[np.int64]
+    threshold: NDArray[np.float64]
+    children_left: NDArray[np.int64]
+    children_right: NDArray[np.int64]
+    label: NDArray[np.int64] | None = None
+
+    def apply(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
+        """The leaf that each state reaches, (B,), as `PolicyTree.apply`."""
+        return walk(
+            observations, self.feature, self.threshold, self.children_left, self.children_right
+        )
+
+
+def count_tree(
+    structure: TreeStructure,
+    demonstrations: Demonstrations,
+    index: int,
+    *,
+    divider: int,
+    learner: Learner = "exact",
+) -> PolicyTree:
+    """Send demonstrations down a tree and count what the expert did at every node.
+
+    Args:
+        structure: Its queries, over the demonstrations' features.
+        demonstrations: N pairs.
+        index: Which action dimension.
+        divider: Number of intervals of continuous dimensions.
+        learner: What chose the queries.
+
+    Returns:
+        The tree.
+
+    Raises:
+        InputError: If the divider is out of range.
+    """
+    dimension = label_dimensions(demonstrations, divider)[index]
+    demonstrated = demonstrations.action_columns[:, index].copy()
+    labels = dimension.labels_of(demonstrated)
+    left, right = structure.children_left, structure.children_right
+    levels = tree_levels(left, right)
+    n = len(left)
+    parent = np.full(n, -1, dtype=np.int64)
+    depth = np.zeros(n, dtype=np.int64)
+    leaves = structure.apply(demonstrations.observations)
+    # Counted here, since scikit-learn keeps fractions and the positions of the labels it saw.
+    counts = np.bincount(
+        leaves * dimension.n_labels + labels, minlength=n * dimension.n_labels
+    ).reshape(n, dimension.n_labels)
+    for number, level in enumerate(levels):
+        depth[level] = number
+        inner = level[left[level] != LEAF]
+        parent[left[inner]] = inner
+        parent[right[inner]] = inner
+    for level in reversed(levels):
+        inner = level[left[level] != LEAF]
+        counts[inner] = counts[left[inner]] + counts[right[inner]]
+    samples = counts.sum(axis=1)
+    frequent = counts.argmax(axis=1).astype(np.int64)
+    start = np.zeros(n, dtype=np.int64)
+    for level in levels:
+        inner = level[left[level] != LEAF]
+        start[left[inner]] = start[inner]
+        start[right[inner]] = start[inner] + samples[left[inner]]
+    return PolicyTree(
+        index=index,
+        dimension=dimension,
+        divider=int(divider),
+        source=Source.of(demonstrations).with_splits(
+            splits_of(structure.feature, structure.threshold, demonstrations)
+        ),
+        feature=structure.feature,
+        threshold=structure.threshold,
+        children_left=left,
+        children_right=right,
+        parent=parent,
+        depth=depth,
+        counts=counts.astype(np.int64),
+        # Stable, so that the rows of a leaf keep their order in time.
+        sample_order=np.argsort(start[leaves], kind="stable").astype(np.int64),
+        sample_start=start,
+        demonstrated=demonstrated,
+        label=(
+            frequent
+            if structure.label is None
+            else np.where(structure.label < 0, frequent, structure.label)
+        ),
+        number=np.arange(n, dtype=np.int64),
+        learner=learner,
+    )
+
+
+def tree_levels(left: NDArray[np.int64], right: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """The nodes of each depth.
+
+    Args:
+        left: Node number of the left child, (n,), `LEAF` at leaves.
+        right: Of the right child, likewise.
+
+    Returns:
+        Node numbers, one array a depth, the root first.
+    """
+    levels = [np.zeros(1, dtype=np.int64)]
+    while len(inner := levels[-1][left[levels[-1]] != LEAF]):
+        levels.append(np.concatenate([left[inner], right[inner]]))
+    return levels

@@ -1,0 +1,277 @@
+"""Learners of trees: whatever chooses the queries, what is counted at the nodes is exact."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sarl_core import (
+    Demonstrations,
+    InputError,
+    Shield,
+    WorkError,
+    grow_policy_trees,
+    load_demonstrations,
+    mine_rules,
+    threshold_landscape,
+)
+from sarl_core.mining.editing.regrowing import next_queries, regrown
+from sarl_core.mining.growing import growth, histogram
+from sarl_core.mining.growing.growth import learner_for
+from sarl_core.mining.tree import LEAF
+from tests.mining.strategies import labelled_states
+
+TASKS = ("cartpole", "lunar_lander", "pendulum", "lunar_lander_continuous")
+FEWER = 16  # bins, to see what many values in a bin do without a million of them
+
+
+@pytest.fixture
+def few_bins(monkeypatch):
+    monkeypatch.setattr(histogram, "BINS", FEWER)
+
+
+def histogram_trees(demonstrations, **options):
+    return grow_policy_trees(demonstrations, learner="histogram", **options)
+
+
+def gini(labels):
+    return 1 - sum((np.mean(labels == one)) ** 2 for one in np.unique(labels))
+
+
+def impurity_left(states, labels, feature, threshold):
+    left = states[:, feature] <= threshold
+    return np.mean(left) * gini(labels[left]) + np.mean(~left) * gini(labels[~left])
+
+
+def best_impurity(demonstrations, rows):
+    """What the best of all queries leaves; infinite where all states are the same."""
+    states, labels = demonstrations.observations[rows], demonstrations.actions[rows]
+    return min(
+        (
+            impurity_left(states, labels, feature, value)
+            for feature in range(states.shape[1])
+            for value in np.unique(states[:, feature])[:-1]
+        ),
+        default=np.inf,
+    )
+
+
+def expect_exact_counts(tree, demonstrations):
+    """Every pair walked by hand, with the comparison of the shield."""
+    reached = {node: [] for node in range(tree.n_nodes)}
+    for row, state in enumerate(demonstrations.observations):
+        node = 0
+        reached[0].append(row)
+        while tree.feature[node] != LEAF:
+            low = np.float64(state[tree.feature[node]]) <= tree.threshold[node]
+            node = int((tree.children_left if low else tree.children_right)[node])
+            reached[node].append(row)
+    for node, rows in reached.items():
+        assert sorted(tree.rows(node).tolist()) == rows
+        assert rows  # no node that nothing reaches
+        labels = demonstrations.actions[rows]
+        counts = np.bincount(labels, minlength=tree.dimension.n_labels)
+        assert np.array_equal(tree.counts[node], counts)
+
+
+@settings(max_examples=80)
+@given(labelled_states())
+def test_counts_are_those_of_all_pairs_and_no_query_would_part_a_leaf_better(demonstrations):
+    (tree,) = histogram_trees(demonstrations)
+    expect_exact_counts(tree, demonstrations)
+    for leaf in np.flatnonzero((tree.feature == LEAF) & (tree.confidence < 1.0)):
+        rows = tree.rows(int(leaf))
+        if len(rows) == 2:  # the learner at times leaves two states together
+            continue
+        assert best_impurity(demonstrations, rows) >= gini(demonstrations.actions[rows]) - 1e-6
+
+
+@settings(max_examples=60)
+@given(labelled_states())
+def test_with_fewer_values_than_bins_each_query_is_as_good_as_the_best(demonstrations):
+    (tree,) = histogram_trees(demonstrations)
+    for node in np.flatnonzero(tree.feature != LEAF)[:6]:
+        rows = tree.rows(int(node))
+        states, labels = demonstrations.observations[rows], demonstrations.actions[rows]
+        best = best_impurity(demonstrations, rows)
+        own = impurity_left(states, labels, tree.feature[node], tree.threshold[node])
+        assert own == pytest.approx(best, abs=1e-6)
+
+
+@settings(max_examples=40)
+@given(labelled_states(max_steps=200), st.floats(0, 1), st.floats(0, 1))
+def test_rules_and_landscape_of_such_trees_agree(demonstrations, supp, conf):
+    trees = histogram_trees(demonstrations)
+    rules = mine_rules(trees, supp_min=supp, conf_min=conf)
+    applying = np.sum([rule.applies(demonstrations.observations) for rule in rules], axis=0)
+    assert np.all(applying <= 1)
+    for rule in rules:
+        here = rule.applies(demonstrations.observations)
+        assert here.sum() == rule.samples
+        assert (demonstrations.actions[here] == rule.action).sum() == rule.correct
+    cell = threshold_landscape(trees, [supp], [conf])
+    assert cell.rule_count[0, 0] == len(rules)
+    assert cell.coverage[0, 0] == pytest.approx(rules.coverage)
+
+
+@settings(max_examples=30)
+@given(st.integers(0, 10**6))
+def test_counts_are_exact_where_bins_hold_many_values(seed):
+    rng = np.random.default_rng(seed)
+    states = rng.normal(size=(300, 2)).astype(np.float32)
+    labels = (rng.random(300) < 1 / (1 + np.exp(-4 * states[:, 0]))).astype(np.int64)
+    demonstrations = Demonstrations(states, labels, np.arange(300) // 30)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(histogram, "BINS", FEWER)
+        (tree,) = histogram_trees(demonstrations)
+    expect_exact_counts(tree, demonstrations)
+    for index in range(2):
+        borders = np.unique(tree.threshold[tree.feature == index])
+        assert len(borders) < FEWER
+        # Halfway between two neighbouring values.
+        values = np.sort(states[:, index].astype(np.float64))
+        place = np.searchsorted(values, borders)
+        assert np.array_equal(borders, (values[place - 1] + values[place]) / 2)
+
+
+def test_a_leaf_that_bins_leave_mixed_is_told_as_it_is(few_bins):
+    states = np.arange(160, dtype=np.float32)[:, None]
+    labels = np.arange(160) % 2
+    demonstrations = Demonstrations(states, labels, np.zeros(160, dtype=int))
+    (tree,) = histogram_trees(demonstrations)
+    leaves = tree.feature == LEAF
+    assert leaves.sum() <= FEWER
+    assert (tree.samples[leaves] == 10).all()
+    assert (tree.confidence[leaves] == 0.5).all()
+    assert len(mine_rules([tree], supp_min=0.0, conf_min=1.0)) == 0
+
+
+def test_one_label_alone_and_one_value_alone_are_one_leaf():
+    states = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)
+    (tree,) = histogram_trees(Demonstrations(states, np.zeros(50, int), np.zeros(50, int)))
+    assert tree.n_nodes == 1
+    labels = np.arange(50) % 3
+    (tree,) = histogram_trees(Demonstrations(states * 0, labels, np.zeros(50, int)))
+    assert tree.n_nodes == 1
+    assert tree.counts.tolist() == [[17, 17, 16]]
+
+
+@pytest.mark.parametrize("scale", [3e-43, 1e-38, 1e-20, 1e-6, 1.0, 1e20, 1e27])
+def test_features_of_any_scale_have_the_same_tree(scale):
+    rng = np.random.default_rng(3)
+    states = rng.integers(-500, 500, (400, 3)).astype(np.float32)
+    labels = (states[:, 0] + states[:, 1] > 0).astype(np.int64)
+    (usual,) = histogram_trees(Demonstrations(states, labels, np.arange(400) // 40))
+    scaled = (states.astype(np.float64) * scale).astype(np.float32)
+    (other,) = histogram_trees(Demonstrations(scaled, labels, np.arange(400) // 40))
+    assert np.array_equal(usual.feature, other.feature)
+    assert np.array_equal(usual.counts, other.counts)
+    unfiltered = mine_rules([other], supp_min=0.0, conf_min=1.0)
+    decided = Shield(unfiltered).decide_batch(scaled, 1 - labels)
+    assert np.array_equal(decided.executed, labels)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_it_is_about_as_good_as_the_exact_learner_in_other_episodes(task):
+    demonstrations = load_demonstrations(f"data/demonstrations/{task}.parquet")
+    numbers = np.unique(demonstrations.episodes)
+    mined = demonstrations.select(numbers[numbers % 3 != 0])
+    other = demonstrations.select(numbers[numbers % 3 == 0])
+    shares, sizes = [], []
+    for learner in ("exact", "histogram"):
+        trees = grow_policy_trees(mined, learner=learner, divider=4, min_support=0.001)
+        assert {tree.learner for tree in trees} == {learner}
+        sizes.append(sum(tree.n_nodes for tree in trees))
+        right = [
+            tree.label[tree.apply(other.observations)]
+            == tree.dimension.labels_of(other.action_columns[:, tree.index])
+            for tree in trees
+        ]
+        shares.append(float(np.mean(right)))
+    assert shares[1] > shares[0] - 0.01
+    assert sizes[1] == pytest.approx(sizes[0], rel=0.15)
+
+
+def test_a_tree_is_the_same_again_and_knows_its_learner(lander_like):
+    (one,), (two,) = histogram_trees(lander_like), histogram_trees(lander_like)
+    assert one.digest == two.digest
+    assert one.learner == "histogram"
+    (exact,) = grow_policy_trees(lander_like)
+    assert exact.learner == "exact"
+    (shallow,) = histogram_trees(lander_like, max_depth=3)
+    assert shallow.depth.max() == 3
+
+
+@pytest.mark.parametrize("least", [0.005, 0.0101, 0.2, 1.0])
+@pytest.mark.parametrize("learner", ["exact", "histogram"])
+def test_no_node_below_the_minimum_support_is_split(lander_like, learner, least):
+    (tree,) = grow_policy_trees(lander_like, learner=learner, min_support=least)
+    assert (tree.support[tree.feature != LEAF] >= least).all()
+    (full,) = grow_policy_trees(lander_like, learner=learner)
+    assert tree.n_nodes < full.n_nodes
+    # And every node with that support is split that can be.
+    stopped = (tree.feature == LEAF) & (tree.support >= least) & (tree.confidence < 1.0)
+    for node in np.flatnonzero(stopped):
+        rows = tree.rows(int(node))
+        assert best_impurity(lander_like, rows) >= gini(lander_like.actions[rows]) - 1e-6
+
+
+@settings(max_examples=60)
+@given(labelled_states(max_steps=120), st.floats(0, 1), st.floats(0, 1), st.floats(0, 1))
+def test_rules_at_that_support_are_those_of_the_whole_tree(demonstrations, least, above, conf):
+    supp = least + above * (1 - least)
+    whole = grow_policy_trees(demonstrations)
+    cut = grow_policy_trees(demonstrations, min_support=least)
+    wanted = mine_rules(whole, supp_min=supp, conf_min=conf)
+    assert mine_rules(cut, supp_min=supp, conf_min=conf).rules == wanted.rules
+
+
+def test_a_part_is_regrown_by_the_learner_of_the_tree(lander_like, monkeypatch):
+    monkeypatch.setattr(growth, "EXACT_UP_TO", 100)
+    (tree,) = histogram_trees(lander_like)
+    queries = next_queries(tree, 0, lander_like)
+    assert queries[0].current
+    assert queries[1].gain <= queries[0].gain
+    other = queries[1]
+    again = regrown(tree, 0, other.feature, other.threshold, lander_like)
+    assert again.learner == "histogram"
+    assert (again.feature[0], again.threshold[0]) == (other.feature, other.threshold)
+    assert again.correct[again.feature == LEAF].sum() == len(lander_like)
+
+
+def test_auto_takes_the_histogram_learner_for_many_pairs_where_it_is_there(monkeypatch):
+    assert learner_for("auto", growth.EXACT_UP_TO) == "exact"
+    assert learner_for("auto", growth.EXACT_UP_TO + 1) == "histogram"
+    assert learner_for("exact", 10**9) == "exact"
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        histogram, "find_spec", lambda name: None if name == "sklearnex" else find(name)
+    )
+    assert learner_for("auto", 10**9) == "exact"
+
+
+def test_without_the_extra_it_says_what_to_install(lander_like, monkeypatch):
+    monkeypatch.setitem(sys.modules, "sklearnex", None)
+    monkeypatch.delitem(sys.modules, "sklearnex.ensemble", raising=False)
+    with pytest.raises(WorkError, match=r"pip install 'sarl-explorer\[large\]'"):
+        histogram_trees(lander_like)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"learner": "fast"}, "learner is 'fast'; choose one of exact, histogram, auto"),
+        ({"learner": 3}, "learner is 3"),
+        ({"min_support": 1.5}, "grown is 1.5; give 0 to 1"),
+        ({"min_support": float("nan")}, "give 0 to 1"),
+        ({"min_support": "all"}, "give 0 to 1"),
+    ],
+)
+def test_what_is_no_learner_or_support_is_refused(lander_like, options, says):
+    with pytest.raises(InputError, match=says):
+        grow_policy_trees(lander_like, **options)
