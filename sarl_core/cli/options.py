@@ -135,6 +135,15 @@ Divider = Annotated[
         help="Intervals of each continuous action dimension.",
     ),
 ]
+LearnerName = Annotated[
+    Literal["exact", "histogram", "auto"],
+    typer.Option(
+        "--learner",
+        help="What grows the trees: exact tries every border between two values; histogram those "
+        "between 1,024 bins of a feature, which suits many steps (it needs the extra large); auto "
+        "is exact up to 50,000 steps, then histogram where that is installed.",
+    ),
+]
 EnvArguments = Annotated[
     str | None,
     typer.Option(

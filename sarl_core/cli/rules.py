@@ -16,6 +16,7 @@ from sarl_core.cli.options import (
     EnvOfFile,
     Files,
     Json,
+    LearnerName,
     MissingName,
     out_option,
     with_columns,
@@ -61,6 +62,7 @@ def mine(
     env: EnvOfFile = None,
     lift: Annotated[float, typer.Option("--lift", help="Minimum lift.")] = 0.0,
     divider: Divider = 2,
+    learner: LearnerName = "auto",
     max_depth: Annotated[
         int | None,
         typer.Option(
@@ -127,6 +129,7 @@ def mine(
     from sarl_core.cli.answers.summaries import (
         describe_oddities,
         describe_rules,
+        print_learner,
         print_oddities,
         print_rules,
     )
@@ -135,6 +138,8 @@ def mine(
         from sarl_core.cli.answers.evidence import Tried
         from sarl_core.mining.algorithm_1 import mine_rules
         from sarl_core.mining.combining.choice import chosen_again
+        from sarl_core.mining.envelope import with_boxes
+        from sarl_core.mining.growing.growth import grow_policy_trees, learner_for
         from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
         from sarl_core.mining.validation import cross_fitting, holding_out
         from sarl_core.mining.validation.episode_counts import count_rules
@@ -154,14 +159,12 @@ def mine(
                 mined = chosen_again(split.mined, combined, divider=divider)
                 split = split._replace(mined=mined, held_out=split.held_out.deriving(mined.derived))
             demonstrations = split.mined
-        rule_set = mine_rules(
-            demonstrations,
-            supp_min=pair[0],
-            conf_min=pair[1],
-            lift_min=lift,
-            max_depth=max_depth,
-            divider=divider,
+        chosen = learner_for(learner, len(demonstrations))
+        trees = grow_policy_trees(demonstrations, divider=divider, learner=chosen)
+        mined_rules = mine_rules(
+            trees, supp_min=pair[0], conf_min=pair[1], lift_min=lift, max_depth=max_depth
         )
+        rule_set = with_boxes(mined_rules, demonstrations)
         judged = None
         if cross_fit:
             fit = cross_fitting.cross_fit(
@@ -169,6 +172,7 @@ def mine(
                 divider=divider,
                 seed=seed,
                 combined=combined,
+                learner=chosen,
             )
             judged = fit.at(rule_set.thresholds)
         if split is not None:
@@ -187,6 +191,7 @@ def mine(
     else:
         print_oddities(oddities)
         print_rules(rule_set, out, tried, judged)
+        print_learner(learner, trees)
 
 
 @with_environment
@@ -200,6 +205,7 @@ def landscape(
     missing: MissingName = "refuse",
     env: EnvOfFile = None,
     divider: Divider = 2,
+    learner: LearnerName = "auto",
     supports: Annotated[
         str,
         typer.Option(
@@ -236,7 +242,7 @@ def landscape(
         grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
         recorded = read_demonstrations(files, env, columns, missing)
         recorded = with_wanted(recorded, derived, divider=divider)
-        trees = grow_policy_trees(recorded, divider=divider)
+        trees = grow_policy_trees(recorded, divider=divider, learner=learner)
         plane = threshold_landscape(trees, *grid)
         names = [tree.dimension.name for tree in trees]
         source = trees[0].source
@@ -245,7 +251,7 @@ def landscape(
     if as_json:
         terminal.print_json({**landscape_document(plane, names), "notes": list(recorded.notes)})
         return
-    from sarl_core.cli.answers.summaries import print_notes
+    from sarl_core.cli.answers.summaries import print_learner, print_notes
 
     cells = f"{plane.rule_count.size:,} cells"
     grown = ", ".join(f"{tree.n_nodes:,}" for tree in trees)
@@ -255,4 +261,5 @@ def landscape(
             f"rules, from {'a tree' if len(trees) == 1 else 'trees'} of {grown} nodes."
         ]
     )
+    print_learner(learner, trees)
     print_notes(recorded.notes)

@@ -104,6 +104,7 @@ def mine_rules(
         source=source_of(trees),
         thresholds=thresholds,
         divider=trees[0].divider,
+        learner=trees[0].learner,
     )
     if isinstance(demonstrations_or_trees, Demonstrations):
         return with_boxes(mined, demonstrations_or_trees)

@@ -7,7 +7,7 @@ from typing import Literal
 
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rules import Rule, Thresholds
-from sarl_core.mining.tree import Source
+from sarl_core.mining.tree import Learner, Source
 
 
 @dataclass(frozen=True)
@@ -20,3 +20,4 @@ class RuleContents:
     thresholds: Thresholds
     divider: int = 2
     cut: Literal["thresholds", "leaves"] = "thresholds"
+    learner: Learner = "exact"

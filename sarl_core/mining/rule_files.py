@@ -39,13 +39,14 @@ from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
 from sarl_core.mining.rule_contents import RuleContents
 from sarl_core.mining.rules import Condition, Operator, Rule, Thresholds
-from sarl_core.mining.tree import Source
+from sarl_core.mining.tree import Learner, Source
 
 FORMAT = "sarl-rules"
 VERSIONS = (1, 2)
 """Version 2 tells in how many episodes held-out pairs lie, what features say of words, how they are
-derived from others, and which actions labels stand for that do not count. A file without all that
-is written as version 1, which is what it was before there was another."""
+derived from others, which actions labels stand for that do not count, and that a histogram learner
+grew the trees. A file without all that is written as version 1, which is what it was before there
+was another."""
 _MOST_CONDITIONS = 500_000  # a line for each of their values: a file of 50 MB
 
 
@@ -173,6 +174,7 @@ def _document(rule_set: RuleContents) -> dict[str, Any]:
         "divider": rule_set.divider,
         # Where it is the paper's cut, the file is what it was before there was another.
         **({"cut": rule_set.cut} if rule_set.cut != "thresholds" else {}),
+        **({"learner": rule_set.learner} if rule_set.learner != "exact" else {}),
         "demonstrations": {
             "digest": source.digest,
             "steps": source.steps,
@@ -188,6 +190,7 @@ def _needs_version_2(rule_set: RuleContents) -> bool:
         any(rule.held_out is not None for rule in rule_set.rules)
         or any(one.indicator or one.derived for one in rule_set.source.features)
         or any(action.codes for action in rule_set.actions)
+        or rule_set.learner != "exact"
     )
 
 
@@ -546,6 +549,7 @@ class _Document(DocumentPart, Generic[_Held]):
     demonstrations: _Demonstrations
     rules: list[_Rule[_Held]]
     cut: Literal["thresholds", "leaves"] = "thresholds"
+    learner: Learner = "exact"
 
     def read(self) -> RuleContents:
         features = _features(self.features, self.version)
@@ -566,4 +570,5 @@ class _Document(DocumentPart, Generic[_Held]):
             Thresholds(**asdict(self.thresholds)),
             self.divider,
             self.cut,
+            self.learner,
         )

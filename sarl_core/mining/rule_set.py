@@ -62,6 +62,7 @@ class RuleSet(RuleContents, Sequence[Rule]):
         divider: Number of intervals of continuous dimensions.
         cut: Where the paths were cut: at the first node that reaches the thresholds
             (Algorithm 1), or nowhere, so that every leaf is a rule and every state is covered.
+        learner: What chose the queries of the trees.
     """
 
     def __len__(self) -> int:

@@ -20,6 +20,7 @@ from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.mining import mining
 from sarl_dashboard.state import combining, rule_base
 from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_dashboard.state.mined import learner_of
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider
 
 UNASKED = 250_000  # steps up to which it is made without being asked for
@@ -30,7 +31,8 @@ def key_of(demonstrations: Demonstrations, divider: int) -> tuple[object, ...]:
     """What the trees without each fold depend on."""
     if demonstrations.is_discrete:
         divider = MIN_DIVIDER
-    return ("elsewhere", demonstrations.pairs_digest, divider, combining.pairs(demonstrations))
+    learner, combined = learner_of(demonstrations), combining.pairs(demonstrations)
+    return ("elsewhere", demonstrations.pairs_digest, divider, learner, combined)
 
 
 def judged(thresholds: Thresholds) -> Judged | None:
@@ -87,13 +89,14 @@ def job_of(key: tuple[object, ...]) -> Job[CrossFit] | None:
 def begin(demonstrations: Demonstrations, divider: int) -> None:
     """Grow the trees without each fold, in the place of what is on its way; for a callback too."""
     key, session = key_of(demonstrations, divider), owner()
-    combined = combining.pairs(demonstrations)
+    combined, learner = combining.pairs(demonstrations), learner_of(demonstrations)
 
     def work(executor: Executor, progress: Progress) -> CrossFit:
         return cross_fit(
             demonstrations,
             divider=divider,
             combined=combined,
+            learner=learner,
             executor=executor,
             progress=progress,
         )

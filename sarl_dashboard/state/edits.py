@@ -104,7 +104,7 @@ def trees_with(of: Base, edits: tuple[Edit, ...]) -> Trees | None:
     demonstrations = chosen_demonstrations()
     if of.kind != CHOSEN or demonstrations is None:
         return None
-    trees = grown_trees(demonstrations, of.rule_set.divider)
+    trees = grown_trees(demonstrations, of.rule_set.divider, of.rule_set.learner)
     for edit in edits:
         if isinstance(edit, Regrow):
             trees = _with_part(trees, edit, demonstrations)

@@ -11,17 +11,22 @@ from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.editing.renaming import renamed_trees
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.evidence import EpisodeCounts
-from sarl_core.mining.growing.growth import grow_policy_trees
+from sarl_core.mining.growing.growth import grow_policy_trees, learner_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import Landscape, threshold_landscape
 from sarl_core.mining.thresholds.pareto import ParetoPoint, pareto_front
-from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.tree import Learner, PolicyTree
 from sarl_core.mining.validation.holding_out import count_held_out, with_held_out
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.data import chosen_demonstrations, data_parts
 from sarl_dashboard.state.hold_out import Parts
-from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider, chosen_thresholds
+from sarl_dashboard.state.thresholds import (
+    MIN_DIVIDER,
+    chosen_divider,
+    chosen_learner,
+    chosen_thresholds,
+)
 
 Trees = tuple[PolicyTree, ...]
 
@@ -30,24 +35,36 @@ Trees = tuple[PolicyTree, ...]
     show_spinner="Growing the decision tree …",
     hash_funcs={Demonstrations: attrgetter("pairs_digest")},
 )
-def _grown_under_any_name(demonstrations: Demonstrations, divider: int) -> Trees:
-    return grow_policy_trees(demonstrations, divider=divider)
+def _grown_under_any_name(demonstrations: Demonstrations, divider: int, learner: Learner) -> Trees:
+    return grow_policy_trees(demonstrations, divider=divider, learner=learner)
 
 
-@cached()
-def grown_trees(demonstrations: Demonstrations, divider: int) -> Trees:
+def grown_trees(
+    demonstrations: Demonstrations, divider: int, learner: Learner | None = None
+) -> Trees:
     """The trees of demonstrations, one an action dimension; other names grow no others.
 
     Args:
         demonstrations: N pairs.
         divider: Number of intervals of continuous actions; without meaning for discrete ones.
+        learner: What grows them; the chosen one where not given.
 
     Returns:
         Shared between sessions (they are immutable).
     """
     if demonstrations.is_discrete:
         divider = MIN_DIVIDER
-    return renamed_trees(_grown_under_any_name(demonstrations, divider), demonstrations)
+    return _grown(demonstrations, divider, learner or learner_of(demonstrations))
+
+
+@cached()
+def _grown(demonstrations: Demonstrations, divider: int, learner: Learner) -> Trees:
+    return renamed_trees(_grown_under_any_name(demonstrations, divider, learner), demonstrations)
+
+
+def learner_of(demonstrations: Demonstrations) -> Learner:
+    """What grows the trees of demonstrations, as it is chosen."""
+    return learner_for(chosen_learner(), len(demonstrations))
 
 
 @cached()

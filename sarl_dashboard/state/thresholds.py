@@ -7,11 +7,14 @@ from typing import Any
 
 import streamlit as st
 
+from sarl_core.mining.growing.growth import LearnerChoice
 from sarl_core.mining.rules import FILTERED, Thresholds
+from sarl_dashboard.state.url import set_url_choice, url_choice
 
 THRESHOLDS = "thresholds"
 """In an address: the rules are those at the thresholds."""
 MIN_DIVIDER, MAX_DIVIDER = 2, 16
+LEARNERS: tuple[LearnerChoice, ...] = ("auto", "exact", "histogram")
 MAX_LIFT = 20.0
 MAX_DEPTH = 64  # 0 is no limit
 
@@ -65,3 +68,14 @@ def choose_divider(divider: int) -> None:
     """Choose a divider; for callbacks, and before its slider is drawn."""
     if st.session_state.get("divider") != divider:
         st.session_state["divider"] = divider
+
+
+def chosen_learner() -> LearnerChoice:
+    """What grows the trees (URL: learner)."""
+    chosen = url_choice("learner", LEARNERS, LEARNERS[0])
+    return next(one for one in LEARNERS if one == chosen)
+
+
+def choose_learner(learner: LearnerChoice) -> None:
+    """Choose a learner; for callbacks."""
+    set_url_choice("learner", learner, LEARNERS[0])

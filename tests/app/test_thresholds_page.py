@@ -159,3 +159,20 @@ def test_the_jumps_say_what_they_are() -> None:
     app = open_page("thresholds", data="cartpole", support="0", confidence="0")
     assert app.button(key="support_below").label == "none"
     assert app.button(key="support_below").disabled
+
+
+def test_the_learner_is_chosen_and_said_and_in_the_link() -> None:
+    app = open_page("thresholds", data="cartpole")
+    assert any("Learner: exact" in one.value for one in app.caption)
+    app.selectbox(key="_learner_choice").set_value("histogram").run()
+    assert not app.exception
+    assert any("Learner: histogram" in one.value for one in app.caption)
+    trees = grow_policy_trees(load_demonstrations(DATA / "cartpole.parquet"), learner="histogram")
+    rules = mine_rules(trees, supp_min=0.005, conf_min=0.95)
+    assert metrics(app)["Rules"] == f"{rules.rule_count:,}"
+    assert app.query_params["learner"] == ["histogram"]
+    linked = open_page("thresholds", data="cartpole", learner="histogram")
+    assert metrics(linked) == metrics(app)
+    assert "Learner: exact" in str(
+        [one.value for one in open_page("thresholds", learner="x").caption]
+    )

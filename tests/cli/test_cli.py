@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from sarl_core import RuleSet, load_demonstrations
+from sarl_core import RuleSet, grow_policy_trees, load_demonstrations, mine_rules
 from sarl_core.cli.app import main
+from sarl_core.explaining.words import growth as words
+from sarl_core.mining.envelope import with_boxes
+from sarl_core.mining.growing import growth
 
 ROOT = Path(__file__).resolve().parents[2]
 LANDER = str(ROOT / "data" / "demonstrations" / "lunar_lander.parquet")
@@ -399,3 +402,32 @@ def test_where_one_file_is_wanted_several_are_refused_with_what_to_do(capsys, tm
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert 'quote the pattern ("runs/*.csv") or give the folder' in error
+
+
+def test_mine_grows_trees_by_the_learner_that_is_named(run, tmp_path):
+    path = tmp_path / "rules.json"
+    options = ("--setting", "filtered", "--out", path, "--learner", "histogram")
+    assert "1,024 bins of each feature" in run("mine", LANDER, *options)
+    assert json.loads(run("mine", LANDER, *options, "--json"))["learner"] == "histogram"
+    rules = RuleSet.load(path)
+    assert rules.learner == "histogram"
+    trees = grow_policy_trees(load_demonstrations(LANDER), learner="histogram")
+    assert (
+        rules.rules
+        == with_boxes(
+            mine_rules(trees, supp_min=0.005, conf_min=0.95), load_demonstrations(LANDER)
+        ).rules
+    )
+
+
+def test_mine_says_that_many_steps_waited_for_want_of_the_other_learner(run, tmp_path, monkeypatch):
+    monkeypatch.setattr(growth, "EXACT_UP_TO", 1_000)
+    monkeypatch.setattr(words, "EXACT_UP_TO", 1_000)
+    path = tmp_path / "rules.json"
+    options = ("--setting", "filtered", "--out", path)
+    assert "histogram" in run("mine", LANDER, *options)
+    for place in (growth, words):
+        monkeypatch.setattr(place, "is_installed", lambda: False)
+    answer = run("mine", LANDER, *options)
+    assert "pip install 'sarl-explorer[large]'" in " ".join(answer.split())
+    assert RuleSet.load(path).learner == "exact"

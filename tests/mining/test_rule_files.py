@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sarl_core import Demonstrations, InputError, RuleSet, mine_rules
+from sarl_core import Demonstrations, InputError, RuleSet, grow_policy_trees, mine_rules
 from sarl_core.limits import READ_LIMIT
 from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.rule_set import rules_digest, rules_from_json, rules_to_json
@@ -361,3 +361,20 @@ def test_whatever_stands_in_a_file_is_read_or_refused_in_a_sentence(document, da
         assert rules_from_json(rules_to_json(rules)) == rules
     assert "\n" not in said
     assert len(said) < 400
+
+
+def test_a_file_says_that_a_histogram_learner_grew_the_trees(lander_like, tmp_path):
+    trees = grow_policy_trees(lander_like, learner="histogram")
+    rules = mine_rules(trees, supp_min=0.01, conf_min=0.9)
+    path = tmp_path / "rules.json"
+    rules.save(path)
+    document = json.loads(path.read_text())
+    assert (document["version"], document["learner"]) == (2, "histogram")
+    assert RuleSet.load(path) == rules
+    assert RuleSet.load(path).learner == "histogram"
+    exact = mine_rules(lander_like, supp_min=0.01, conf_min=0.9)
+    exact.save(path)
+    assert "learner" not in json.loads(path.read_text())
+    path.write_text(json.dumps(document | {"learner": "guess"}))
+    with pytest.raises(InputError, match="learner"):
+        RuleSet.load(path)

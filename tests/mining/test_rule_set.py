@@ -138,6 +138,7 @@ SET_CHANGES: dict[str, Callable[[RuleSet], Any]] = {
     "thresholds": lambda rules: replace(rules.thresholds, max_depth=40),
     "divider": lambda rules: rules.divider + 1,
     "cut": lambda rules: "leaves",
+    "learner": lambda rules: "histogram",
 }
 
 

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from sarl_core.cli.answers.evidence import Tried
     from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
     from sarl_core.demonstrations.formats.mapping.preview import ColumnPreview
+    from sarl_core.mining.growing.growth import LearnerChoice
     from sarl_core.mining.rule_set import RuleSet
+    from sarl_core.mining.tree import PolicyTree
     from sarl_core.mining.validation.cross_fitting import Judged
     from sarl_core.rendering.replay import Replay
     from sarl_core.shielding.shield import Shield
@@ -302,6 +304,7 @@ def describe_rules(
             "max_depth": thresholds.max_depth,
         },
         "divider": rule_set.divider,
+        "learner": rule_set.learner,
         "rules": rule_set.rule_count,
         "mean_length": rule_set.mean_length,
         "coverage": rule_set.coverage,
@@ -313,6 +316,21 @@ def describe_rules(
         **({"held_out": describe_tried(rule_set, tried)} if tried is not None else {}),
         **({"cross_fitted": describe_judged(judged, rule_set)} if judged is not None else {}),
     }
+
+
+def print_learner(choice: LearnerChoice, trees: Sequence[PolicyTree]) -> None:
+    """Print what grew trees, where that is not what it always is.
+
+    Args:
+        choice: That was made.
+        trees: Grown by it, of the same demonstrations.
+    """
+    from sarl_core.explaining.words.growth import learner_text, missing_learner_text
+
+    if trees[0].learner != "exact":
+        terminal.print_facts([("learner", learner_text(trees[0].learner))])
+    missing = missing_learner_text(choice, trees[0].source.steps)
+    terminal.print_lines([f"note: {missing}"] if missing else [])
 
 
 def print_rules(

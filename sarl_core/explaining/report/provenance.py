@@ -17,6 +17,7 @@ from sarl_core.environments.formulas import Formula
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.combining.choice import with_combinations
+from sarl_core.mining.growing.growth import EXACT_UP_TO
 from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.mining.rules import NAMED_SETTINGS
@@ -153,6 +154,7 @@ def mining_command(
             "--lift": threshold_text(limits.lift) if limits.lift else None,
             "--max-depth": limits.max_depth,
             "--divider": rule_set.divider if continuous else None,
+            "--learner": _learner_option(rule_set),
             **derived,
             "--column": as_options(columns or {}),
             "--missing": None if missing == "refuse" else missing,
@@ -160,6 +162,12 @@ def mining_command(
             "--out": rules,
         },
     )
+
+
+def _learner_option(rule_set: RuleSet) -> str | None:
+    """None where "auto" takes this learner, whatever is installed."""
+    few = rule_set.source.steps <= EXACT_UP_TO
+    return None if few and rule_set.learner == "exact" else rule_set.learner
 
 
 def _derived_options(

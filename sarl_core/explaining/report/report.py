@@ -200,7 +200,9 @@ def make_report(
     rule_set = with_splits(rule_set, demonstrations)
     counts = tally(rule_set, demonstrations)
     if trees is None and rule_set.cut == "thresholds":
-        trees = grow_policy_trees(demonstrations, divider=rule_set.divider)
+        trees = grow_policy_trees(
+            demonstrations, divider=rule_set.divider, learner=rule_set.learner
+        )
     order = in_order(rule_set, wishes.in_full)
     examples, without = _examples(rule_set, demonstrations, order[0], wishes, progress)
     about = demonstrations.env_id or rule_set.source.env_id
@@ -355,6 +357,6 @@ def _elsewhere(
         return "", ""
     divider = rule_set.divider
     combined = pairs_chosen_from(demonstrations, divider=divider)
-    fit = cross_fit(demonstrations, divider=divider, combined=combined)
+    fit = cross_fit(demonstrations, divider=divider, combined=combined, learner=rule_set.learner)
     judged = fit.at(rule_set.thresholds)
     return judged_sentence(judged), parting_text(rule_set.fidelity, judged)

@@ -27,7 +27,7 @@ from sarl_core.mining.evidence import EpisodeCounts, HeldOut, held_out_of
 from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
-from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.tree import Learner, PolicyTree
 from sarl_core.mining.validation.episode_counts import Influence, count_nodes, most_influential
 from sarl_core.processes import run_each
 from sarl_core.progress import Progress
@@ -186,6 +186,7 @@ def cross_fit(
     folds: int | None = None,
     seed: int = 0,
     combined: Sequence[Pair] = (),
+    learner: Learner = "exact",
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> CrossFit:
@@ -200,6 +201,7 @@ def cross_fit(
         seed: Same seed, same folds.
         combined: Pairs of features that rules may combine. Where there are some, each fold's trees
             choose their own combinations of them: the fold has no say in that either.
+        learner: What grows the trees.
         executor: Its processes grow the trees.
         progress: Told how many folds are done; may stop the rest.
 
@@ -226,7 +228,7 @@ def cross_fit(
     dealt = [order[first :: min(folds, count)] for first in range(min(folds, count))]
     fitted = run_each(
         fold_of,
-        [(parted, some, divider, tuple(combined)) for some in dealt],
+        [(parted, some, divider, tuple(combined), learner) for some in dealt],
         executor=executor,
         progress=progress,
     )
@@ -238,6 +240,7 @@ def fold_of(
     episodes: Integers,
     divider: int,
     combined: Sequence[Pair] = (),
+    learner: Learner = "exact",
 ) -> Fold:
     """Grow trees without some episodes, and send those down them.
 
@@ -246,6 +249,7 @@ def fold_of(
         episodes: Numbers of those that the trees are not to know.
         divider: Number of intervals of continuous dimensions.
         combined: Pairs of features of which combinations are chosen, without those episodes.
+        learner: What grows the trees.
 
     Returns:
         Both.
@@ -255,7 +259,7 @@ def fold_of(
     if combined:
         mined = chosen_again(mined, combined, divider=divider)
         judged = judged.deriving(mined.derived)
-    trees = grow_policy_trees(mined, divider=divider)
+    trees = grow_policy_trees(mined, divider=divider, learner=learner)
     return Fold(trees, tuple(count_nodes(tree, judged) for tree in trees))
 
 

@@ -14,6 +14,7 @@ from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.tree import Learner
 from sarl_core.mining.validation.cross_fitting import judge
 from sarl_core.mining.validation.episode_counts import count_rules
 from sarl_core.processes import run_each
@@ -71,6 +72,7 @@ def learning_curve(
     thresholds: Thresholds,
     *,
     divider: int = 2,
+    learner: Learner = "exact",
     held_out: Demonstrations | None = None,
     orders: int = 6,
     points: int = 8,
@@ -84,6 +86,7 @@ def learning_curve(
         demonstrations: What rules are mined from, E episodes.
         thresholds: Of every rule set.
         divider: Number of intervals of continuous dimensions.
+        learner: What grows the trees.
         held_out: What every rule set is tried on; where not given, the episodes that come later
             in the order, so that there is nothing to try the last point on.
         orders: Drawn by chance; they show how much depends on which episodes came first.
@@ -118,7 +121,7 @@ def learning_curve(
     curve_points = run_each(
         curve_point,
         [
-            (demonstrations, drawn[row], int(sizes[column]), thresholds, divider, held_out)
+            (demonstrations, drawn[row], int(sizes[column]), thresholds, divider, learner, held_out)
             for row, column in places
         ],
         executor=executor,
@@ -145,6 +148,7 @@ def curve_point(
     size: int,
     thresholds: Thresholds,
     divider: int,
+    learner: Learner,
     held_out: Demonstrations | None,
 ) -> CurvePoint:
     """Mine from the first episodes of an order.
@@ -155,6 +159,7 @@ def curve_point(
         size: How many of them.
         thresholds: Of the rule set.
         divider: Number of intervals of continuous dimensions.
+        learner: What grows the trees.
         held_out: What the rules are tried on; where not given, the rest of the order.
 
     Returns:
@@ -168,7 +173,7 @@ def curve_point(
     except InputError:  # an episode of a single step is no demonstration by itself
         return CurvePoint(0, 0.0, 0.0, float("nan"))
     mined = mine_rules(
-        grow_policy_trees(some, divider=divider),
+        grow_policy_trees(some, divider=divider, learner=learner),
         supp_min=thresholds.support,
         conf_min=thresholds.confidence,
         lift_min=thresholds.lift,

@@ -227,7 +227,9 @@ def resampled(
         What was found.
     """
     mined = mine_rules(
-        grow_policy_trees(_drawn(demonstrations, drawn), divider=rule_set.divider),
+        grow_policy_trees(
+            _drawn(demonstrations, drawn), divider=rule_set.divider, learner=rule_set.learner
+        ),
         supp_min=rule_set.thresholds.support,
         conf_min=rule_set.thresholds.confidence,
         lift_min=rule_set.thresholds.lift,

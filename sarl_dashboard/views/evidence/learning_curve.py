@@ -29,6 +29,7 @@ def show_curve(evidence: RuleSetEvidence) -> None:
         return
     mined, held_out = parts.mined, parts.held_out
     thresholds, divider = evidence.thresholds, evidence.rule_set.divider
+    learner = evidence.rule_set.learner
     st.caption(
         "Rules are mined from one episode, from a few more, and so on to all, at the present "
         f"thresholds, in {ORDERS} orders of the episodes. A curve that still climbs at its end "
@@ -46,6 +47,7 @@ def show_curve(evidence: RuleSetEvidence) -> None:
             mined,
             thresholds,
             divider=divider,
+            learner=learner,
             held_out=held_out,
             orders=ORDERS,
             executor=executor,

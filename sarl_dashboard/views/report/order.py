@@ -73,7 +73,7 @@ def order_of(choices: ReportChoices, demonstrations: Demonstrations) -> ReportOr
     )
     trees = None
     if rule_set.cut == "thresholds":
-        trees = grown_trees(demonstrations, rule_set.divider)
+        trees = grown_trees(demonstrations, rule_set.divider, rule_set.learner)
     # The card of the shipped compact rules says how they came about.
     card = read_card(compact_file(choices.rules)) if choices.rules in COMPACT_ENDINGS else None
     return ReportOrder(rule_set, demonstrations, wishes, card, results, trees)

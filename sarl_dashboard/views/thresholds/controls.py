@@ -104,7 +104,11 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
         named_settings(thresholds, rule_base.compact_name() if display.compact else None)
     point = display.point(thresholds)
     everything = display.dimension is None
-    show_numbers(point, cross_fitting.judged(thresholds) if everything else None)
+    show_numbers(
+        point,
+        cross_fitting.judged(thresholds) if everything else None,
+        display.trees[0] if display.compact is None else None,
+    )
     if everything:
         elsewhere_notice(thresholds, float(point.fidelity[0, 0]))
     show_recommendation(display, thresholds)

@@ -9,6 +9,9 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.figures.thresholds import Layer
+from sarl_core.explaining.words.growth import LEARNERS
+from sarl_core.mining.growing.growth import EXACT_UP_TO
+from sarl_core.mining.growing.histogram import BINS
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
@@ -19,7 +22,7 @@ from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.compact_set import Compact
 from sarl_dashboard.state.mined import mined_landscape
-from sarl_dashboard.state.thresholds import MAX_DEPTH, MAX_LIFT
+from sarl_dashboard.state.thresholds import MAX_DEPTH, MAX_LIFT, choose_learner, chosen_learner
 
 MAPS, SURFACES = "Maps", "3-D"
 FINE, PAPER = "Fine grid", "Paper's grid"
@@ -161,6 +164,25 @@ def more() -> None:
             on_change=rule_base.choose,
             help=with_words("Most conditions of a rule. 0: no limit."),
         )
+        st.session_state["_learner_choice"] = chosen_learner()
+        st.selectbox(
+            "Learner",
+            list(LEARNERS),
+            key="_learner_choice",
+            format_func=LEARNERS.__getitem__,
+            on_change=_choose_learner,
+            help=with_words(
+                "What grows the decision tree. Exact tries every border between two values; "
+                f"histogram those between {BINS:,} bins of a feature, for many states. Automatic: "
+                f"exact up to {EXACT_UP_TO:,} states, then histogram where it is installed. "
+                "Counts are of all states with either."
+            ),
+        )
+
+
+def _choose_learner() -> None:
+    rule_base.choose()
+    choose_learner(st.session_state["_learner_choice"])
 
 
 def chosen_dimension(names: list[str]) -> int | None:

@@ -7,21 +7,25 @@ from typing import Any
 import streamlit as st
 
 from sarl_core.explaining.words.cross_fit import elsewhere_text
+from sarl_core.explaining.words.growth import LEARNERS, learner_text, missing_learner_text
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import share_text
 from sarl_core.mining.thresholds.landscape import Landscape
+from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_dashboard.components.journey.words import with_words, word_help
+from sarl_dashboard.state.thresholds import chosen_learner
 
 _ELSEWHERE = "Elsewhere: in an episode that the rules were not mined from, on average."
 
 
-def show_numbers(point: Landscape, judged: Judged | None) -> None:
+def show_numbers(point: Landscape, judged: Judged | None, tree: PolicyTree | None) -> None:
     """The four numbers of the rule set in force, and what two of them are in other episodes.
 
     Args:
         point: A landscape of one point.
         judged: The same rules in episodes that they were not mined from; None where not known.
+        tree: One of those that are cut, to say what grew it; None for other rules.
     """
     rules = int(point.rule_count[0, 0])
     with st.container(horizontal=True, key="metrics"):
@@ -52,6 +56,17 @@ def show_numbers(point: Landscape, judged: Judged | None) -> None:
                     "so that each episode counts once"
                 ),
             )
+        if tree is not None:
+            st.caption(
+                f"Learner: {LEARNERS[tree.learner].lower()}",
+                width="content",
+                help=with_words(
+                    f"{learner_text(tree.learner)[0].upper()}{learner_text(tree.learner)[1:]}."
+                ),
+            )
+    missing = "" if tree is None else missing_learner_text(chosen_learner(), tree.source.steps)
+    if missing:
+        st.caption(f":material/info: {missing}")
 
 
 def elsewhere(share: HeldOut | None) -> dict[str, Any]:
