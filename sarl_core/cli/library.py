@@ -128,7 +128,7 @@ def show_item(identifier: _Identifier, as_json: Json = False) -> None:
 
     Example: `python -m sarl_core library show ID`
     """
-    from sarl_core.library.results import note_text, notes_about
+    from sarl_core.library.results import note_text, note_writer, notes_about
 
     opened = _opened()
     item = opened.item(identifier)
@@ -144,7 +144,7 @@ def show_item(identifier: _Identifier, as_json: Json = False) -> None:
                 "notes": [
                     {
                         "id": one.id,
-                        "author": one.author,
+                        "author": note_writer(one),
                         "created": one.created.isoformat(),
                         "text": text,
                     }
@@ -159,7 +159,7 @@ def show_item(identifier: _Identifier, as_json: Json = False) -> None:
     if item.kind == "result":
         _print_result(opened, item)
     for one, text in notes:
-        terminal.print_lines(["", f"{one.author}, {_time_text(one.created)}:", text])
+        terminal.print_lines(["", f"{note_writer(one)}, {_time_text(one.created)}:", text])
 
 
 @library.command("export")
@@ -170,7 +170,7 @@ def export_items(
     out: Annotated[Path, out_option("A .sarl file.")],
     as_json: Json = False,
 ) -> None:
-    """Write things, with all that they came from, into one file for another machine.
+    """Write things, with all that they came from and the notes, into one file to carry elsewhere.
 
     Example: `python -m sarl_core library export ID --out rules.sarl`
     """

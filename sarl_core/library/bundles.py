@@ -69,7 +69,7 @@ class _Bundle(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def export_bundle(library: Library, identifiers: Sequence[str], path: str | Path) -> list[Item]:
-    """Write things, with all that they came from, into one file.
+    """Write things, with all that they came from and the notes to these, into one file.
 
     Args:
         library: Where they are.
@@ -100,6 +100,7 @@ def export_bundle(library: Library, identifiers: Sequence[str], path: str | Path
         items = {key: item for key, item in items.items() if item.removed is None}
         if not items:
             raise InputError("what is to be exported was removed; bring it back first")
+    items = _notes_to(library, items) | items
     with (
         whole_file(target) as unfinished,
         zipfile.ZipFile(unfinished, "w", zipfile.ZIP_DEFLATED) as archive,
@@ -117,6 +118,21 @@ def export_bundle(library: Library, identifiers: Sequence[str], path: str | Path
                     written.add(file.digest)
                     archive.write(library.path(item, file.role), _entry(file))
     return list(items.values())
+
+
+def _notes_to(library: Library, items: Mapping[str, Item]) -> dict[str, Item]:
+    """The notes to some things, and to these notes, by their ids: the last that was written first.
+
+    What else one of them is about stays where it is.
+    """
+    notes: dict[str, Item] = {}
+    left = list(items)
+    while left:
+        for note in library.made_of(left.pop(), kind="note"):
+            if note.id not in notes and note.id not in items:
+                notes[note.id] = note
+                left.append(note.id)
+    return dict(sorted(notes.items(), key=lambda entry: entry[1].created, reverse=True))
 
 
 def import_bundle(library: Library, path: str | Path, *, author: str) -> list[Item]:

@@ -233,6 +233,11 @@ def notes_about(library: Library, item: Item) -> list[Item]:
     return library.made_of(item.id, kind="note")[::-1]
 
 
+def note_writer(note: Item) -> str:
+    """Who wrote a note; whose it is here may have brought it from elsewhere."""
+    return str(note.details.get("made_by", note.author))
+
+
 def standing_ids(library: Library, identifiers: Sequence[str]) -> list[str]:
     """Ids as they are written down.
 

@@ -10,6 +10,7 @@ from PIL import Image
 from streamlit.testing.v1 import AppTest
 
 from sarl_core.library import Item, Library
+from sarl_core.library.bundles import export_bundle, import_bundle
 from sarl_core.library.results import add_note, add_result, note_text, notes_about
 from sarl_dashboard.views.library import contents
 from tests.app.screens import errors, html, open_page, texts
@@ -153,3 +154,18 @@ def test_a_missing_file_is_said_in_its_place(tmp_path: Path) -> None:
     app.run()
     assert any("is missing from the library" in one for one in errors(app))
     assert "library_remove" in {button.key for button in app.button}
+
+
+def test_a_note_that_was_brought_along_is_of_whoever_wrote_it(
+    rules: Item, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Library() as library:
+        add_note(library, "Why so few?", author="Eve", about=[rules.id])
+        export_bundle(library, [rules.id], tmp_path / "rules.sarl")
+    with Library(tmp_path / "there") as there:
+        import_bundle(there, tmp_path / "rules.sarl", author="Ada")
+        assert [one.author for one in notes_about(there, rules)] == ["Ada"]
+    monkeypatch.setenv("SARL_LIBRARY", str(tmp_path / "there"))
+    app = open_page("library", item=rules.id)
+    assert "Why so few?" in plain(app)
+    assert any(button.label.startswith("Eve, ") for button in app.button)

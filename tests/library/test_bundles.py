@@ -18,6 +18,7 @@ from sarl_core.errors import InputError
 from sarl_core.library import Item, Library
 from sarl_core.library.bundles import export_bundle, import_bundle
 from sarl_core.library.contents import add_demonstrations, add_rules, demonstrations_of, rules_of
+from sarl_core.library.results import add_note, note_text, notes_about
 
 DATA = Path(__file__).parents[2] / "data"
 
@@ -82,6 +83,50 @@ def test_rules_travel_with_their_data_versions_and_approvals(
         copied = demonstrations_of(there, there.item(of))
         assert copied.digest == shown.digest
         assert copied.derived == shown.derived
+
+
+def test_notes_travel_with_what_they_are_about(
+    library: Library, there: Library, rules: Item, tmp_path: Path
+) -> None:
+    other = add_note(library, "Of no concern here.", author="Ada")
+    first = add_note(library, "Why so few?", author="Ada", about=[rules.id, other.id])
+    second = add_note(library, "Read it to the operators.", author="Eve", about=[rules.id])
+    to_data = add_note(library, "Recorded in March.", author="Ada", about=rules.came_from)
+    answer = add_note(library, "They can be read.", author="Eve", about=[first.id])
+    gone = add_note(library, "Not meant.", author="Ada", about=[rules.id])
+    library.remove(gone.id, author="Ada")
+    path = tmp_path / "with notes.sarl"
+    sent = {item.id for item in export_bundle(library, [rules.id], path)}
+    assert {first.id, second.id, to_data.id, answer.id} < sent
+    assert not {other.id, gone.id} & sent
+    for _ in range(2):
+        assert {item.id for item in import_bundle(there, path, author="Bob")} == sent
+        brought = notes_about(there, there.item(rules.id))
+        assert [note_text(there, one) for one in brought] == [
+            "Why so few?",
+            "Read it to the operators.",
+        ]
+        assert [one.details["made_by"] for one in brought] == ["Ada", "Eve"]
+        assert [one.id for one in notes_about(there, there.item(first.id))] == [answer.id]
+        assert [one.id for one in notes_about(there, there.item(rules.came_from[0]))] == [
+            to_data.id
+        ]
+
+
+def test_a_note_in_a_bundle_is_what_was_written(
+    library: Library, there: Library, rules: Item, tmp_path: Path
+) -> None:
+    add_note(library, "Why so few?", author="Ada", about=[rules.id])
+    path = tmp_path / "rules.sarl"
+    export_bundle(library, [rules.id], path)
+
+    def with_another_text(listed: dict, files: dict[str, bytes]) -> None:
+        (name,) = (name for name in files if name.endswith(".txt"))
+        files[name] = b"x" * len(files[name])
+
+    with pytest.raises(InputError, match="is not what it was when it was exported"):
+        import_bundle(there, changed(path, with_another_text), author="Bob")
+    assert there.items() == []
 
 
 def changed(bundle: Path, change: Callable[[dict, dict[str, bytes]], None]) -> Path:

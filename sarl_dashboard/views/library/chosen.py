@@ -109,7 +109,7 @@ def _buttons(opened: Library, item: Item, author: str, *, own: bool) -> None:
             partial(_bundle, opened, item),
             f"{file_name(item.name)}{ENDING}",
             key="library_export",
-            meaning="With all that it was made of and its earlier versions, as one file",
+            meaning="With all that it was made of, its earlier versions and the notes, as one file",
         )
         if not own:
             return

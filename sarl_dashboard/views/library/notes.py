@@ -8,7 +8,7 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_core.library import Item, Library
-from sarl_core.library.results import add_note, note_text, notes_about
+from sarl_core.library.results import add_note, note_text, note_writer, notes_about
 from sarl_dashboard.state.url import set_url_choice
 from sarl_dashboard.text import escaped, refuse
 
@@ -59,7 +59,7 @@ def show_notes(opened: Library, item: Item, author: str) -> None:
     """
     for one in notes_about(opened, item):
         with st.container(border=True):
-            who = "You" if one.author == author else one.author
+            who = "You" if note_writer(one) == author else note_writer(one)
             label = f"{escaped(who)}, {one.created.astimezone():%d %B %Y, %H:%M}"
             _open_button(label, one.id, f"note_item_{one.id}")
             try:
