@@ -10,9 +10,10 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_dashboard.components.journey.environment_needed import require_environment
+from sarl_dashboard.components.run_bar import bars_at_work
 from sarl_dashboard.components.settings import known_seeds_notice
 from sarl_dashboard.text import refuse
-from sarl_dashboard.views.ablation.outcome import outcome
+from sarl_dashboard.views.ablation.outcome import PLACE, outcome
 from sarl_dashboard.views.ablation.settings import settings
 
 st.title("Worth of each rule")
@@ -20,11 +21,12 @@ st.caption(
     "What each rule is worth: the same episodes again with one rule taken out, so that one sees "
     "which rules carry load, which do harm, and which do nothing."
 )
-require_environment()
+require_environment(PLACE)
 try:
     choice = settings()
 except SarlError as error:
     refuse(error)
+    bars_at_work(PLACE)
     st.stop()
 if choice.on_demonstrated_seeds:
     known_seeds_notice()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_dashboard.components.journey.environment_needed import require_environment
-from sarl_dashboard.jobs.replays import REPLAY, arrived, latest
+from sarl_dashboard.jobs.replays import EPISODE_RUNS, FORK, REPLAY, arrived, latest
 from sarl_dashboard.views.replay.episodes import comparison, take_up
 from sarl_dashboard.views.replay.film import film, headline
 from sarl_dashboard.views.replay.numbers import numbers
@@ -19,7 +19,7 @@ st.caption(
     "rules are learned from demonstrations and guarantee nothing."
 )
 set_out()
-require_environment()
+require_environment(REPLAY, FORK, EPISODE_RUNS)
 result, form = st.container(), st.container()
 with form:
     choices = settings()

@@ -10,7 +10,9 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_dashboard.components.journey.environment_needed import require_environment
+from sarl_dashboard.components.run_bar import bars_at_work
 from sarl_dashboard.components.settings import known_seeds_notice
+from sarl_dashboard.jobs.episodes import COMPARISON
 from sarl_dashboard.state.environments import demonstrated, environment_of
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.shield.lines import guards, line, pilots
@@ -22,13 +24,14 @@ st.caption(
     "What a shield is worth that was learned from demonstrations and guarantees nothing: agents "
     "with the rules and without, on the same seeds."
 )
-require_environment()
+require_environment(COMPARISON)
 choices = settings()
 try:
     env_id = environment_of(choices.env)
     agents = pilots(choices, env_id)
 except SarlError as error:
     refuse(error)
+    bars_at_work(COMPARISON)
     st.stop()
 shields = guards(choices)
 lines = [line(choices, env_id, agent, shield) for agent in agents for shield in shields]
@@ -37,6 +40,7 @@ if not lines:
         "Choose at least one agent and one shield; a shield of your own needs its file.",
         icon=":material/checklist:",
     )
+    bars_at_work(COMPARISON)
     st.stop()
 if choices.from_demonstrations and demonstrated(env_id, choices.seed, choices.episodes):
     known_seeds_notice()

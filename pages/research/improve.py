@@ -13,7 +13,7 @@ from sarl_dashboard.components.journey.environment_needed import require_environ
 from sarl_dashboard.state.data import require_demonstrations
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.improve.order import order_of
-from sarl_dashboard.views.improve.run import run_of
+from sarl_dashboard.views.improve.run import PLACE, run_of
 from sarl_dashboard.views.improve.settings import settings
 
 st.title("Improve")
@@ -22,8 +22,8 @@ st.caption(
     "and few rules are made of all its answers; with nobody to ask, the states that need a "
     "demonstration."
 )
+require_environment(PLACE)
 demonstrations = require_demonstrations()
-require_environment()
 choices = settings(demonstrations)
 order = None
 try:

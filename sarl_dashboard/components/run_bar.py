@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Generic, Literal
 
 import streamlit as st
@@ -107,6 +108,22 @@ def watched(place: Place[Any], draw: Callable[[bool], None], *, seconds: float =
         draw(at_work)
 
     watch()
+
+
+def bars_at_work(*places: Place[Any]) -> None:
+    """How far work is that was begun with other choices, and the way to call it off.
+
+    Args:
+        *places: Of a page whose present choices ask for nothing that can be had.
+    """
+    for place in places:
+        if place.at_work:
+            st.caption("What was begun with other choices goes on.")
+            watched(place, partial(_bar, place))
+
+
+def _bar(place: Place[Any], at_work: bool) -> None:
+    run_bar(place, None)
 
 
 def episodes_bar(place: Place[EpisodeBatch], rows: Sequence[Row], episodes: int) -> None:

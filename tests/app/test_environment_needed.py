@@ -109,3 +109,40 @@ def test_without_demonstrations_nobody_learns() -> None:
     app = open_page("learning", data="upload", learn_view="Your own")
     assert not errors(app)
     assert "Nothing has been uploaded in this session" in texts(app)
+
+
+WORK = {  # the job's place, and choices that keep it at work for long
+    "replay": ("replay", {"agent": "expert", "seed": "3"}),
+    "shield": ("comparison", {"episodes": "2000"}),
+    "ablation": ("ablation", {"episodes": "500"}),
+    "improve": ("improve", {"rounds": "200", "round_episodes": "500"}),
+}
+
+
+@pytest.mark.parametrize("page", WORK)
+def test_what_is_at_work_can_be_called_off_whatever_data_are_chosen_since(
+    page: str, tmp_path: Path
+) -> None:
+    place, choices = WORK[page]
+    app = uploaded(nameless(), tmp_path)
+    mine = app.selectbox(key="_data_choice").value
+    app.selectbox(key="_data_choice").set_value("lunar_lander").run()
+    for name, value in choices.items():
+        app.query_params[name] = value
+    app.switch_page(page_file(page)).run()
+    if f"cancel_{place}" not in [button.key for button in app.button]:
+        app.button(key=f"run_{place}").click().run()
+    app.selectbox(key="_data_choice").set_value(mine).run()
+    assert NAMELESS in texts(app)
+    app.button(key=f"cancel_{place}").click().run()
+    assert not app.exception
+    assert f"cancel_{place}" not in [button.key for button in app.button]
+
+
+def test_what_is_at_work_can_be_called_off_where_nothing_is_chosen_any_more() -> None:
+    app = open_page("shield", data="lunar_lander", episodes="2000")
+    app.button(key="run_comparison").click().run()
+    app.button_group(key="agents").set_value([]).run()
+    assert "Choose at least one agent" in texts(app)
+    app.button(key="cancel_comparison").click().run()
+    assert "cancel_comparison" not in [button.key for button in app.button]

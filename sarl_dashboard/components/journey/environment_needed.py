@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import streamlit as st
 
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import SarlError
+from sarl_dashboard.components.run_bar import bars_at_work
 from sarl_dashboard.components.settings import environment_choice
+from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.state.data import require_demonstrations, uncombined_demonstrations
 from sarl_dashboard.state.environments import AS_DEMONSTRATED, environment_of
 from sarl_dashboard.text import escaped, in_full, refuse
 
 
-def require_environment() -> None:
+def require_environment(*places: Place[Any]) -> None:
     """Go on where there is an environment to play in; else ask for one, and end the page.
 
     What was typed, or came with a link, is refused as an error. Demonstrations without an
     environment are none: most tasks have no simulator.
+
+    Args:
+        *places: Of the page's work. What goes on can be called off, whatever was chosen since.
     """
     choice = st.session_state.get("env") or st.query_params.get("env") or AS_DEMONSTRATED
     problem = _problem(choice)
     if problem is None:
         return
+    bars_at_work(*places)
     if choice == AS_DEMONSTRATED:
         _say_missing(
             problem,
