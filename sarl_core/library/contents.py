@@ -337,4 +337,6 @@ _SAID = {
     "edits": "edits of rules",
     "names": "names given to data",
     "episodes": "finished episodes",
+    "improvement": "what came of improving rules",
+    "study": "a study of learning",
 }

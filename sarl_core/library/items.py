@@ -13,9 +13,19 @@ from typing import Any, Literal, get_args
 from sarl_core.errors import InputError, quoted
 from sarl_core.explaining.words.sign_off import Approval
 
-Kind = Literal["demonstrations", "rules", "result", "note", "edits", "names", "episodes"]
+Kind = Literal[
+    "demonstrations",
+    "rules",
+    "result",
+    "note",
+    "edits",
+    "names",
+    "episodes",
+    "improvement",
+    "study",
+]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-UNLISTED: tuple[Kind, ...] = ("edits", "names", "episodes")
+UNLISTED: tuple[Kind, ...] = ("edits", "names", "episodes", "improvement", "study")
 """What links need and nobody looks for: in a list only where it is asked for."""
 
 PREFIX = "library:"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from urllib.parse import urlencode, urlsplit
 
 import streamlit as st
@@ -59,7 +59,11 @@ def _history() -> tuple[tuple[Edit, ...], str]:
 
 
 def keep_result_button(
-    content: str | bytes | Callable[[], str | bytes], file: str, *, key: str
+    content: str | bytes | Callable[[], str | bytes],
+    file: str,
+    *,
+    key: str,
+    beside: Callable[[], Sequence[str]] = tuple,
 ) -> None:
     """A button that keeps a result, with the address that opens it as it is.
 
@@ -67,6 +71,7 @@ def keep_result_button(
         content: Of the file, or what makes it.
         file: Its name.
         key: Of the button.
+        beside: Keeps what belongs to it, and gives the ids.
     """
     if not st.button(
         "Keep",
@@ -75,10 +80,10 @@ def keep_result_button(
         help="In the library, with the address of this page as it is now",
     ):
         return
-    made = content() if callable(content) else content
     names = (chosen_dataset(), rule_base.base_name())
-    about = [name for name in names if library.is_id(name)]
     try:
+        made = content() if callable(content) else content
+        about = [*beside(), *(name for name in names if library.is_id(name))]
         item = library.keep_result(
             made.encode() if isinstance(made, str) else made, file, about, _address()
         )

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from threading import Lock
 
 import streamlit as st
 
+from sarl_core import __version__
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.environment import EnvironmentOrId
+from sarl_core.errors import SarlError
 from sarl_core.improving.aggregation import Aggregation, AggregationRound, aggregate
 from sarl_core.improving.gaps import Gaps, gaps_so_far
+from sarl_core.improving.outcome_files import (
+    aggregation_contents,
+    aggregation_from,
+    gaps_contents,
+    gaps_from,
+)
 from sarl_core.improving.plan import Plan
+from sarl_core.library.items import Kind
+from sarl_core.limits import limited_bytes
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.processes import Processes
@@ -24,8 +34,11 @@ from sarl_dashboard.jobs.episodes import AgentMaker
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.jobs.processes import processes
 from sarl_dashboard.memory_cache import BoundedCache
+from sarl_dashboard.state import library
+from sarl_dashboard.text import digest_of
 
 MOST_OUTCOMES = 6  # a finished run holds up to some ten megabytes of demonstrations
+_KIND: Kind = "improvement"
 _SOON = 0.03  # share of the work from which on the rest can be guessed
 
 
@@ -55,6 +68,11 @@ class ImprovementOrder:
         expert = self.expert.digest if self.expert is not None else None
         return key_of((self.start, self.env_id, self.plan, expert, self.rules))
 
+    @cached_property
+    def digest(self) -> str:
+        """The same for a library, which outlives this process; other versions run anew."""
+        return digest_of(repr((__version__, self.key)).encode())
+
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
@@ -73,6 +91,13 @@ class Outcome:
     gaps: Gaps | None = None
 
     @property
+    def is_finished(self) -> bool:
+        """Whether all of it was done."""
+        if self.gaps is not None:
+            return self.gaps.episodes >= self.order.plan.episodes
+        return self.improved is not None and self.improved.is_finished
+
+    @property
     def is_empty(self) -> bool:
         """Whether there is nothing to see."""
         return not self.rounds and self.gaps is None
@@ -82,6 +107,51 @@ class Outcome:
 def outcome_cache() -> BoundedCache[Outcome]:
     """Outcomes of finished runs by their order's key."""
     return BoundedCache(MOST_OUTCOMES)
+
+
+def known_outcome(order: ImprovementOrder) -> Outcome | None:
+    """What came of an order before, in this process or by the library; it may be unfinished.
+
+    Args:
+        order: What is asked for.
+
+    Returns:
+        None where nothing did.
+    """
+    finished = outcome_cache().get(order.key)
+    if finished is not None:
+        return finished
+    outcome = None
+    with suppress(SarlError):  # what cannot be read is run again
+        for paths in library.stored_work(_KIND, order.digest):
+            files = {role: limited_bytes(path) for role, path in paths.items()}
+            if order.expert is None:
+                outcome = Outcome(order, gaps=gaps_from(files))
+            else:
+                improved = aggregation_from(files, order.plan)
+                outcome = Outcome(order, improved.rounds, improved)
+            outcome_cache().put(order.key, outcome)
+    return outcome
+
+
+def keep_outcome(outcome: Outcome) -> None:
+    """Keep what came of an order, so that a link to it opens it.
+
+    Args:
+        outcome: Finished or not; one without rules and states is not kept.
+
+    Raises:
+        SarlError: If it cannot be kept.
+    """
+    order, improved, gaps = outcome.order, outcome.improved, outcome.gaps
+    if improved is not None:
+        contents = aggregation_contents(improved)
+        amount = len(improved.rounds) + improved.is_finished
+    elif gaps is not None:
+        contents, amount = gaps_contents(gaps), gaps.episodes
+    else:
+        return
+    library.keep_work(_KIND, str(order.env_id), order.digest, contents, amount)
 
 
 @st.cache_resource
@@ -107,6 +177,8 @@ def improving(order: ImprovementOrder) -> Job[Outcome]:
         job.result = outcome
         if finished:
             cache.put(order.key, outcome)
+        with suppress(SarlError):  # here it is all the same; a page says that keeping fails
+            keep_outcome(outcome)
 
     return Job(order.key, in_turn, order.plan.rounds * order.plan.episodes, Outcome(order))
 

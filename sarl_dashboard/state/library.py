@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from threading import Lock
@@ -21,11 +21,10 @@ from sarl_core.library.contents import (
     add_rules,
     demonstrations_of,
     edits_of,
-    file_of,
     rules_of,
 )
 from sarl_core.library.file_store import content_digest
-from sarl_core.library.items import as_id
+from sarl_core.library.items import Kind, as_id
 from sarl_core.library.place import LibraryPlace, place_of, usual_author
 from sarl_core.library.results import add_result
 from sarl_core.limits import limited_bytes
@@ -36,6 +35,8 @@ from sarl_core.rollouts.episodes import Episodes
 from sarl_dashboard.cache import cached
 from sarl_dashboard.text import digest_of
 
+_AMOUNT: dict[Kind, str] = {"episodes": "episodes", "improvement": "rounds", "study": "runs"}
+"""How details call how much of some work is finished."""
 _OPENED: dict[LibraryPlace, Library] = {}
 _LOCK = Lock()
 
@@ -210,10 +211,9 @@ def stored_episodes(digest: str) -> Episodes | None:
         digest: Of everything that they depend on.
     """
     with suppress(SarlError):
-        for item in library().with_digest(digest, kind="episodes"):
-            if item.author == author():
-                path = file_of(library(), item, "episodes")
-                return episodes_from_json(limited_bytes(path), name=f"what is kept as {item.id}")
+        for files in stored_work("episodes", digest):
+            path = files["episodes"]
+            return episodes_from_json(limited_bytes(path), name="what is kept of the episodes")
     return None
 
 
@@ -228,21 +228,57 @@ def keep_episodes(episodes: Episodes, name: str, digest: str) -> None:
     Raises:
         SarlError: If they cannot be kept.
     """
-    before = [
-        item for item in library().with_digest(digest, kind="episodes") if item.author == author()
-    ]
-    if any(item.details.get("episodes", 0) >= len(episodes) for item in before):
+    content = {"episodes": (episodes_to_json(episodes).encode(), ".json")}
+    keep_work("episodes", name, digest, content, len(episodes))
+
+
+def stored_work(kind: Kind, digest: str) -> Iterator[dict[str, Path]]:
+    """The files of work that this author has finished before, by their roles.
+
+    Args:
+        kind: Of the work.
+        digest: Of everything that it depends on.
+
+    Yields:
+        Once, or not at all.
+
+    Raises:
+        SarlError: If the library cannot be read, or a file is missing.
+    """
+    for item in _own_work(kind, digest)[:1]:
+        yield {one.role: library().path(item, one.role) for one in item.files}
+
+
+def keep_work(
+    kind: Kind,
+    name: str,
+    digest: str,
+    files: Mapping[str, tuple[Path | bytes, str]],
+    amount: int,
+) -> None:
+    """Keep finished work, so that a link to it opens it; in the place of less of the same.
+
+    Args:
+        kind: Of the work.
+        name: What it is called.
+        digest: Of everything that it depends on.
+        files: By their roles, and the endings of their names.
+        amount: How much of it is finished.
+
+    Raises:
+        SarlError: If it cannot be kept.
+    """
+    before = _own_work(kind, digest)
+    if any(item.details.get(_AMOUNT[kind], 0) >= amount for item in before):
         return
-    library().add(
-        "episodes",
-        name,
-        {"episodes": (episodes_to_json(episodes).encode(), ".json")},
-        author=author(),
-        digest=digest,
-        details={"episodes": len(episodes)},
-    )
+    details = {_AMOUNT[kind]: amount}
+    library().add(kind, name, files, author=author(), digest=digest, details=details)
     for item in before:
         library().remove(item.id, author=author())
+
+
+def _own_work(kind: Kind, digest: str) -> list[Item]:
+    return [item for item in library().with_digest(digest, kind=kind) if item.author == author()]
 
 
 def annotate(demonstrations: Demonstrations, details: Mapping[str, Any]) -> None:

@@ -8,7 +8,8 @@ import pytest
 
 from sarl_core.library import Item, Library
 from sarl_core.library.results import add_result
-from tests.app.screens import errors, open_page, run_through, texts
+from sarl_dashboard.jobs.improving import outcome_cache
+from tests.app.screens import errors, metrics, open_page, run_through, texts
 
 pytestmark = pytest.mark.usefixtures("place")
 
@@ -37,6 +38,65 @@ def test_a_replay_is_kept_as_its_film() -> None:
     assert not errors(app)
     (item,) = results()
     assert item.files[0].ending == ".gif"
+
+
+def restarted() -> None:
+    """Forget what a server's process remembers of its work, as a new one would."""
+    outcome_cache().clear()
+
+
+IMPROVE = {
+    "data": "cartpole",
+    "max_rules": "4",
+    "rounds": "2",
+    "round_episodes": "4",
+    "validation": "8",
+}
+
+
+def test_an_improvement_is_kept_with_its_rules_and_there_again_after_a_restart() -> None:
+    app = run_through(open_page("improve", **IMPROVE), "improve")
+    before = metrics(app)
+    assert before["Mean return"]
+    for _ in range(2):
+        app.button(key="keep_improvement").click().run()
+        assert not errors(app)
+    (item,) = results()
+    with Library() as library:
+        rules, *_ = (library.item(one) for one in item.came_from)
+        (data,) = (library.item(one) for one in rules.came_from)
+        assert (rules.kind, data.kind) == ("rules", "demonstrations")
+        assert "aggregate" in rules.command
+        assert len(library.items("Ada")) == 3
+    restarted()
+    again = open_page("improve", **IMPROVE)
+    assert metrics(again) == before
+    assert again.button(key="run_improve").disabled
+    assert "The settings have changed" not in texts(again)
+    other = open_page("improve", **IMPROVE | {"rounds": "1"})
+    assert not metrics(other)
+    assert not errors(open_page("library", item=item.id))
+
+
+def test_states_that_need_a_demonstration_are_kept_and_there_again() -> None:
+    asked = {"data": "cartpole", "expert": "nobody", "round_episodes": "3", "support": "0.2"}
+    app = run_through(open_page("improve", **asked), "improve")
+    app.button(key="keep_gaps").click().run()
+    (item,) = results()
+    assert item.files[0].ending == ".csv"
+    restarted()
+    again = open_page("improve", **asked)
+    assert again.dataframe[0].value.equals(app.dataframe[0].value)
+
+
+def test_what_is_kept_of_an_improvement_and_damaged_can_be_run_again(place: Path) -> None:
+    run_through(open_page("improve", **IMPROVE), "improve")
+    restarted()
+    for path in (place / "files").glob("*/*.json"):
+        path.write_bytes(b"{")
+    again = open_page("improve", **IMPROVE)
+    assert not errors(again)
+    assert not again.button(key="run_improve").disabled
 
 
 @pytest.mark.parametrize(

@@ -13,8 +13,9 @@ from sarl_core.improving.gaps import Gaps
 from sarl_core.mining.language import counted, share_text
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.tables import table_height
-from sarl_dashboard.jobs.improving import Outcome
+from sarl_dashboard.jobs.improving import Outcome, keep_outcome
 from sarl_dashboard.text import escaped, file_name
 
 MOST_FEATURES = 12
@@ -50,16 +51,25 @@ def show_gaps(outcome: Outcome, gaps: Gaps, *, at_work: bool) -> None:
     show_where(outcome, gaps)
     st.markdown("**Some of these states**")
     show_states(outcome, gaps)
-    download(
-        "Download all as CSV",
-        lambda: str(gaps.to_frame().to_csv(index=False)).encode(),
-        f"gaps-{file_name(str(outcome.order.env_id))}.csv",
-        key="gaps_csv",
-    )
+    file = f"gaps-{file_name(str(outcome.order.env_id))}.csv"
+    with st.container(horizontal=True):
+        download("Download all as CSV", lambda: _table(gaps), file, key="gaps_csv")
+        keep_result_button(
+            lambda: _table(gaps), file, key="keep_gaps", beside=lambda: _keep(outcome)
+        )
     st.caption(
         "The file has the columns of a demonstration file, except the action. Have somebody who "
         "knows fill that in, and upload it on the Demonstrations page."
     )
+
+
+def _table(gaps: Gaps) -> str:
+    return str(gaps.to_frame().to_csv(index=False))
+
+
+def _keep(outcome: Outcome) -> tuple[str, ...]:
+    keep_outcome(outcome)
+    return ()
 
 
 def show_where(outcome: Outcome, gaps: Gaps) -> None:

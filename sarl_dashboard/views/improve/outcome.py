@@ -8,6 +8,7 @@ from functools import partial
 
 import streamlit as st
 
+from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.figures.aggregation import (
     RoundPoint,
     points_of,
@@ -20,9 +21,11 @@ from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import rules_to_json
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import as_file, download
+from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.safety import Tile, safety_tiles
 from sarl_dashboard.components.tables import table_height
-from sarl_dashboard.jobs.improving import Outcome
+from sarl_dashboard.jobs.improving import Outcome, keep_outcome
+from sarl_dashboard.state import library
 from sarl_dashboard.state.data import (
     is_upload_chosen,
     set_upload,
@@ -43,7 +46,7 @@ def show_outcome(outcome: Outcome, *, at_work: bool, changed: bool) -> None:
     if changed:
         used = uploaded_demonstrations()
         improved = outcome.improved
-        if improved is not None and used is not None and used is improved.demonstrations:
+        if improved is not None and used is not None and _same(used, improved.demonstrations):
             st.success(
                 "These demonstrations are now the ones chosen, on every page. Run asks for more "
                 "where their rules lead.",
@@ -229,7 +232,8 @@ def take_away(outcome: Outcome, improved: Aggregation) -> None:
     name = f"{file_name(str(outcome.order.env_id))}-{len(improved.rule_set)}-rules"
     if not improved.is_finished:
         name += ".stopped"
-    in_use = uploaded_demonstrations() is improved.demonstrations
+    used = uploaded_demonstrations()
+    in_use = used is not None and _same(used, improved.demonstrations)
     with st.container(horizontal=True):
         st.button(
             "Use these demonstrations",
@@ -262,12 +266,35 @@ def take_away(outcome: Outcome, improved: Aggregation) -> None:
             key="improve_demonstrations",
             meaning="All pairs of the chosen round (Parquet)",
         )
+        keep_result_button(
+            lambda: card_text(outcome, improved),
+            f"{name}.card.json",
+            key="keep_improvement",
+            beside=lambda: keep_all(outcome, improved, name),
+        )
+
+
+def _same(used: Demonstrations, others: Demonstrations) -> bool:
+    return used is others or used.digest == others.digest
 
 
 def use(improved: Aggregation, name: str) -> None:
     """Work on the improved demonstrations from now on; for a callback."""
     set_upload(improved.demonstrations, file_name=f"{name}.parquet")
     st.rerun()  # the sidebar says what is chosen
+
+
+def keep_all(outcome: Outcome, improved: Aggregation, name: str) -> list[str]:
+    """Keep the rules and their demonstrations, and all that the page shows of the run.
+
+    Raises:
+        SarlError: If they cannot be kept.
+    """
+    keep_outcome(outcome)
+    library.keep(improved.demonstrations, f"{name}.parquet")
+    command = outcome.order.command
+    rules = improved.rule_set
+    return [library.keep_rules(rules, name, improved.demonstrations, command=command).id]
 
 
 def card_text(outcome: Outcome, improved: Aggregation) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
-from sarl_dashboard.jobs.improving import ImprovementOrder, Outcome, improving, outcome_cache
+from sarl_dashboard.jobs.improving import ImprovementOrder, Outcome, improving, known_outcome
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.views.improve.outcome import show_outcome
 from sarl_dashboard.views.improve.shipped import show_shipped
@@ -23,10 +23,13 @@ def run_of(order: ImprovementOrder | None) -> None:
     """
 
     def outcome(at_work: bool) -> None:
-        finished = outcome_cache().get(order.key) if order is not None and not at_work else None
+        stored = known_outcome(order) if order is not None and not at_work else None
+        finished = stored if stored is not None and stored.is_finished else None
         latest = PLACE.job.result if PLACE.job is not None else None
         run_bar(PLACE, offer_of(order, latest, finished) if order is not None else None)
         known = finished or latest
+        if stored is not None and (latest is None or latest.is_empty or changed(latest, order)):
+            known = stored
         if known is None or known.is_empty:
             if not at_work:
                 show_shipped(gaps=order is not None and order.rules is not None)
@@ -34,10 +37,15 @@ def run_of(order: ImprovementOrder | None) -> None:
         show_outcome(
             known,
             at_work=at_work,
-            changed=not at_work and (order is None or known.order.key != order.key),
+            changed=not at_work and changed(known, order),
         )
 
     watched(PLACE, outcome)
+
+
+def changed(known: Outcome, order: ImprovementOrder | None) -> bool:
+    """Whether what is known is of another order."""
+    return order is None or known.order.key != order.key
 
 
 def offer_of(
