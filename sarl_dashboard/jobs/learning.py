@@ -27,19 +27,23 @@ from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.files import shared_temporary_folder
 from sarl_core.learning.arms import LearningArm
 from sarl_core.learning.run import TRIAL_EPISODES
+from sarl_core.learning.study_copies import restore_study, study_contents
 from sarl_core.learning.study_files import (
+    PLAN,
     LearningStudy,
     load_run,
     load_study,
     make_folder,
     policy_path,
 )
+from sarl_core.library.items import Kind
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rollouts.choices import Choice
 from sarl_core.shielding.shield import Projection
 from sarl_core.shipped import DATA
 from sarl_dashboard.jobs.job import Job
+from sarl_dashboard.state import library
 from sarl_dashboard.text import digest_of
 
 ROOT = Path(sarl_core.__file__).parents[1]  # where a process of its own finds the library
@@ -48,6 +52,7 @@ MOST_TRAININGS = 2  # at once, of all visitors: each takes a core
 MOST_FOLDERS = 24  # the oldest go first; one takes a few MB
 LEFT_ALONE = 6 * 3600.0  # seconds without a look before a folder may go
 PATIENCE = 30.0  # seconds that a process gets to save what it has learned
+_KIND: Kind = "study"
 _LOOKED_AT_EVERY = 1.0  # seconds
 _NICE = 10  # the dashboard answers first
 
@@ -128,7 +133,9 @@ def study_of(order: LearningOrder) -> LearningStudy | None:
     Raises:
         InputError: If its folder is damaged.
     """
-    if not (order.folder / "plan.json").is_file():
+    if not (order.folder / PLAN).is_file():
+        _restore(order)
+    if not (order.folder / PLAN).is_file():
         return None
     with suppress(OSError):
         os.utime(order.folder)  # somebody looks at it: it stays
@@ -138,6 +145,30 @@ def study_of(order: LearningOrder) -> LearningStudy | None:
         compared = replace(compared, agent=order.agent[0])
     # Chosen is among what has been played: another choice plays nothing anew.
     return replace(study, settings={**study.settings, "choose": order.choose}, compared=compared)
+
+
+def keep_study(order: LearningOrder) -> None:
+    """Keep what is finished of a study: a link then opens it whatever becomes of its folder.
+
+    Args:
+        order: What was asked for.
+
+    Raises:
+        SarlError: If it cannot be kept.
+    """
+    study = study_of(order)
+    if study is not None and study.finished:
+        contents = study_contents(order.folder, study)
+        name, runs = str(order.env_id), len(study.finished)
+        library.keep_work(_KIND, name, order.folder.name, contents, runs)
+
+
+def _restore(order: LearningOrder) -> None:
+    """Make the folder of a study anew, where it is gone and the study was kept."""
+    with suppress(SarlError):  # what cannot be read is learned again
+        for files in library.stored_work(_KIND, order.folder.name):
+            _make_base()
+            restore_study(order.folder, files)
 
 
 class Training:
@@ -156,10 +187,8 @@ class Training:
         self.waiting, self.fresh = 0, True
         self.folder = order.folder
         _tidy_up(keep | {self.folder})
+        _make_base()
         make_folder(self.folder)
-        _own(self.folder.parent)
-        with suppress(OSError):
-            self.folder.parent.chmod(0o700)
         _take_over_finished(order)
         rules = ["--rules", str(self.folder / "asked.json")] if order.rules is not None else []
         if order.rules is not None:
@@ -301,6 +330,8 @@ def _wait(job: Job[LearningStudy], order: LearningOrder, everyone: Trainings) ->
         ended = not training.running
     finally:
         everyone.leave(training)
+    with suppress(SarlError):  # its folder is there all the same; a page says that keeping fails
+        keep_study(order)
     if ended and job.wanted() and (problem := training.problem()):
         raise WorkError(problem)
 
@@ -368,13 +399,18 @@ def _tidy_up(keep: set[Path]) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def _own(folder: Path) -> None:
-    """Refuse a folder for all studies that somebody else on this machine has made.
+def _make_base() -> None:
+    """Make the folder for all studies, for this user alone.
 
     Raises:
-        WorkError: If it is not this user's.
+        WorkError: If somebody else on this machine has made it.
     """
+    folder = base()
+    with suppress(OSError):
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
     if hasattr(os, "getuid") and folder.exists() and folder.stat().st_uid != os.getuid():
         raise WorkError(
             f"the folder {folder} belongs to another user; name another one in SARL_LEARNING"
         )
+    with suppress(OSError):
+        folder.chmod(0o700)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import subprocess
 import time
 from collections.abc import Iterator
@@ -28,6 +30,7 @@ from sarl_core.learning.study_files import (
     save_tables,
     write_json,
 )
+from sarl_core.library import Library
 from sarl_core.shipped import DATA
 from sarl_dashboard.jobs import learning
 from tests.app.screens import errors, open_page, shown_and_further, texts
@@ -36,7 +39,7 @@ ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture(autouse=True)
-def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def own_folder(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Studies of visitors go where nobody else's are."""
     folder = tmp_path / "visitors"
     monkeypatch.setenv("SARL_LEARNING", str(folder))
@@ -187,11 +190,25 @@ def test_agents_learn_and_what_they_learned_can_be_had(own_folder: Path) -> None
         "Download policy (.npz)",
         "Download everything (.zip)",
     ]
+    assert button(app, "keep_study") is not None
     (folder,) = own_folder.iterdir()
     assert (folder / "policies" / "imitate-0.npz").is_file()
     # Whoever asks the same again sees it at once.
     again = own("none", "imitate", **few)
     assert "all finished" in texts(again)
+    # So it is when the folder has gone with the machine's temporary files.
+    curves = (folder / "curves.csv").read_bytes()
+    shutil.rmtree(folder)
+    again = own("none", "imitate", **few)
+    assert "all finished" in texts(again)
+    assert (folder / "curves.csv").read_bytes() == curves
+    again.button(key="keep_study").click().run()
+    assert not errors(again)
+    with Library() as library:
+        (item,) = library.items("Ada")
+        assert item.name == "learned-CartPole-v1"
+        summary = json.loads(library.path(item).read_text())
+    assert {run["arm"] for run in summary["runs"]} == {"none", "imitate"}
 
 
 def test_what_was_learned_is_chosen_from_again_by_what_comes_first() -> None:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.errors import SarlError
-from sarl_core.learning.study_files import LearningStudy, policy_path
+from sarl_core.learning.study_files import RESULTS, LearningStudy, policy_path, save_tables
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.journey.environment_needed import require_own_environment
+from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
-from sarl_dashboard.jobs.learning import LearningOrder, learning, study_of
+from sarl_dashboard.jobs.learning import LearningOrder, keep_study, learning, study_of
 from sarl_dashboard.text import escaped, file_name, refuse
 from sarl_dashboard.views.learning.settings import settings
 from sarl_dashboard.views.learning.study import archive, show_curves, show_study
@@ -117,7 +118,25 @@ def downloads(order: LearningOrder, study: LearningStudy) -> None:
             "learned.zip",
             key="learn_zip",
         )
+        keep_result_button(
+            lambda: _results(order, study),
+            f"learned-{file_name(str(order.env_id))}.json",
+            key="keep_study",
+            beside=lambda: _keep(order),
+        )
     st.caption(
         "A policy is an agent everywhere: on Replay and Shield as “own file”, on the command line "
         "as `--agent`. It is the network alone, without the rules."
     )
+
+
+def _results(order: LearningOrder, study: LearningStudy) -> bytes:
+    path = order.folder / RESULTS
+    if not path.is_file():  # its process was ended before it could write them
+        save_tables(order.folder, study, {})
+    return path.read_bytes()
+
+
+def _keep(order: LearningOrder) -> tuple[str, ...]:
+    keep_study(order)
+    return ()
