@@ -83,7 +83,9 @@ def _file_of(value: str) -> Path:
 def list_items(
     kind: Annotated[
         str | None,
-        typer.Option("--kind", show_default=False, help="demonstrations, rules, result or note."),
+        typer.Option(
+            "--kind", show_default=False, help="demonstrations, rules, result, note or log."
+        ),
     ] = None,
     removed: Annotated[
         bool, typer.Option("--removed", help="What was removed and can be brought back.")
@@ -94,7 +96,9 @@ def list_items(
 
     Example: `python -m sarl_core library list --kind rules`
     """
-    wanted = None if kind is None else _checked_kind(kind)
+    from sarl_core.library.items import KINDS
+
+    wanted = None if kind is None else _checked_kind(kind, KINDS)
     opened = _opened()
     items = opened.items(kind=wanted, removed=removed)
     if as_json:
@@ -218,14 +222,16 @@ def add_file(
         typer.Argument(
             metavar="FILE",
             show_default=False,
-            help="A result (.csv, .json, .html, .gif, .mp4, .png), a note (.txt, .md), "
+            help="A result (.csv, .json, .html, .gif, .mp4, .png), a note (.txt, .md), a log, "
             "demonstrations, or a rule file.",
         ),
     ],
     kind: Annotated[
         str,
         typer.Option(
-            "--kind", show_default=False, help="What it is: result, note, rules or demonstrations."
+            "--kind",
+            show_default=False,
+            help="What it is: result, note, log, rules or demonstrations.",
         ),
     ],
     name: _Name = None,
@@ -244,16 +250,27 @@ def add_file(
 
     Example: `python -m sarl_core library add audit.json --kind result --about ID`
     """
-    from sarl_core.library.results import add_note, add_result, note_of_file, standing_ids
+    from sarl_core.library.items import KINDS, UNLISTED
+    from sarl_core.library.logs import add_log
+    from sarl_core.library.results import (
+        add_note,
+        add_result,
+        file_content,
+        note_of_file,
+        standing_ids,
+    )
 
     opened, author = _opened(), _author()
-    kind = _checked_kind(kind)
+    kind = _checked_kind(kind, [one for one in KINDS if one not in UNLISTED])
     came_from = standing_ids(opened, about or ())
     if kind == "result":
         item = add_result(opened, file, name or "", author=author, about=came_from)
     elif kind == "note":
         text, ending = note_of_file(file), file.suffix.lower()
         item = add_note(opened, text, name or "", author=author, about=came_from, ending=ending)
+    elif kind == "log":
+        item = add_log(opened, file_content(file), file.name, author=author, about=came_from)
+        item = item if name is None else opened.rename(item.id, name, author=author)
     elif kind == "rules":
         item = _add_rules(opened, file, name, came_from)
     else:
@@ -329,13 +346,11 @@ def _add_demonstrations(
     )
 
 
-def _checked_kind(text: str) -> Kind:
-    from sarl_core.library.items import KINDS
-
-    for kind in KINDS:
+def _checked_kind(text: str, kinds: Sequence[Kind]) -> Kind:
+    for kind in kinds:
         if text == kind:
             return kind
-    raise InputError(f"--kind {text} is no kind of thing; choose from {', '.join(KINDS)}")
+    raise InputError(f"--kind {text} is no kind of thing; choose from {', '.join(kinds)}")
 
 
 def _time_text(time: datetime) -> str:

@@ -20,6 +20,7 @@ from sarl_core.library.annotations import annotated, is_annotated
 from sarl_core.library.database import is_there
 from sarl_core.library.items import Item, Kind
 from sarl_core.library.library import Library
+from sarl_core.library.logs import log_content, log_file_name, log_roles, read_log
 from sarl_core.library.place import place_of
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.editing.edit_files import edits_from_json, edits_to_json
@@ -192,14 +193,18 @@ def annotated_file(library: Library, item: Item, folder: Path) -> Path:
         folder: Where a file may be made.
 
     Returns:
-        Its main file; of demonstrations that were given names or formulas one in the folder, which
-        has them.
+        Its main file; of demonstrations that were given names or formulas, and of a log of whose
+        columns something was said, one in the folder, which has these.
 
     Raises:
         InputError: If it has no one file, it is missing, or what was given does not fit.
         WorkError: If it cannot be written.
     """
     path = file_of(library, item)
+    if item.kind == "log" and (roles := log_roles(item)):
+        log = read_log(log_content(library, item), log_file_name(item), roles)
+        save_demonstrations(log, folder / f"{item.id}.parquet")
+        return folder / f"{item.id}.parquet"
     if item.kind != "demonstrations" or not is_annotated(item.details):
         return path
     demonstrations = load_demonstrations(path)
@@ -334,6 +339,7 @@ _SAID = {
     "rules": "a rule set",
     "result": "a result",
     "note": "a note",
+    "log": "a log",
     "edits": "edits of rules",
     "names": "names given to data",
     "episodes": "finished episodes",

@@ -18,6 +18,7 @@ Kind = Literal[
     "rules",
     "result",
     "note",
+    "log",
     "edits",
     "names",
     "episodes",

@@ -161,7 +161,7 @@ def note_of_file(path: str | Path) -> str:
             "give such a file, or choose another kind"
         )
     try:
-        return _content(path).decode("utf-8-sig")
+        return file_content(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is no text in UTF-8; save it as such") from error
 
@@ -262,7 +262,7 @@ def _require_form(path: Path, ending: str) -> None:
     """Refuse what is not what its name says: it would be found out by whoever opens it."""
     if ending == ".json":
         try:
-            parse_json(_content(path), finite=False)
+            parse_json(file_content(path), finite=False)
         except ValueError as error:
             raise InputError(f"{path} is no JSON ({error}); write it again") from error
     elif ending in _BEGINNINGS:
@@ -273,7 +273,12 @@ def _require_form(path: Path, ending: str) -> None:
             raise InputError(f"{path} is no {ending[1:].upper()}; write it again")
 
 
-def _content(path: Path) -> bytes:
+def file_content(path: Path) -> bytes:
+    """What is in a file that somebody names.
+
+    Raises:
+        InputError: If it cannot be read.
+    """
     try:
         return limited_bytes(path)
     except OSError as error:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import streamlit as st
-from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.demonstrations.formats import ColumnPreview, ColumnRole, preview_columns
 from sarl_core.demonstrations.formats.mapping.joined import labels_together, never_together
@@ -36,6 +35,21 @@ _MOST_UNITS = 40  # features whose units are asked for one by one
 _MOST_KINDS = 12
 
 
+class TableFile(Protocol):
+    """A file that was uploaded, now or in another visit."""
+
+    @property
+    def file_id(self) -> str:
+        """What tells it from others."""
+
+    @property
+    def name(self) -> str:
+        """Of the file."""
+
+    def getbuffer(self) -> memoryview:
+        """Its content."""
+
+
 @dataclass(frozen=True, eq=False)
 class ColumnForm:
     """The form of one uploader.
@@ -52,7 +66,7 @@ class ColumnForm:
     previews: Sequence[ColumnPreview]
 
     @classmethod
-    def of_files(cls, key: str, files: Sequence[UploadedFile]) -> ColumnForm:
+    def of_files(cls, key: str, files: Sequence[TableFile]) -> ColumnForm:
         """The form for files that were uploaded, filled in with what their columns seem to be.
 
         Args:

@@ -13,6 +13,7 @@ from typing import Any, cast
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.formats import ColumnRole
 from sarl_core.errors import InputError, SarlError
 from sarl_core.library import Item, Library
 from sarl_core.library.contents import (
@@ -25,6 +26,7 @@ from sarl_core.library.contents import (
 )
 from sarl_core.library.file_store import content_digest
 from sarl_core.library.items import Kind, as_id
+from sarl_core.library.logs import add_log
 from sarl_core.library.place import LibraryPlace, place_of, usual_author
 from sarl_core.library.results import add_result
 from sarl_core.limits import limited_bytes
@@ -202,6 +204,42 @@ def keep_names(details: Mapping[str, Any]) -> Item:
         if known.author == author():
             return known
     return library().add("names", "names", {}, author=author(), digest=digest, details=details)
+
+
+def keep_log(content: bytes, name: str, roles: Mapping[str, ColumnRole]) -> Item:
+    """Keep a log that was uploaded; where its author keeps the same, that is it.
+
+    Args:
+        content: Of the file.
+        name: Of the file.
+        roles: What was said of its columns.
+
+    Raises:
+        SarlError: If it cannot be read or kept.
+    """
+    opened = library()
+    item = add_log(opened, content, name, author=author(), roles=roles)
+    _say_room(opened)
+    return item
+
+
+def stored_log(identifier: str) -> Item:
+    """A log that is kept.
+
+    Raises:
+        SarlError: If there is none, it was removed, or is something else.
+    """
+    if not is_id(identifier):
+        raise InputError(
+            f"there is no log called {identifier!r}; check the address, or upload the log again"
+        )
+    item = standing_item(identifier)
+    if item.kind != "log":
+        raise InputError(
+            f"what the address names as a log, {item.name!r}, is none; check the address, or "
+            "upload the log again"
+        )
+    return item
 
 
 def stored_episodes(digest: str) -> Episodes | None:

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pandas as pd
+import pytest
+from streamlit.testing.v1 import AppTest
+
 from sarl_core import audit, load_demonstrations, mine_rules
+from sarl_core.library import Item, Library
 from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
+
+
+pytestmark = pytest.mark.usefixtures("place")
 
 
 def upload(path: Path) -> tuple[str, bytes, str]:
@@ -17,7 +25,7 @@ def upload(path: Path) -> tuple[str, bytes, str]:
 def test_a_log_is_held_against_the_rules() -> None:
     app = open_page("audit", data="cartpole", support="0.01", confidence="0.9")
     assert "Upload a log" in texts(app)
-    app.file_uploader(key="log").set_value(upload(DATA / "cartpole.parquet"))
+    app.file_uploader(key="log_file").set_value(upload(DATA / "cartpole.parquet"))
     app.run()
     assert not app.exception
     demonstrations = load_demonstrations(DATA / "cartpole.parquet")
@@ -33,14 +41,129 @@ def test_a_log_is_held_against_the_rules() -> None:
     assert "Asked on the way" in html(app)
     links = [link.proto.page for link in app.get("page_link")]
     assert {"rules", "what_if"} <= set(links)
-    app.file_uploader(key="other_log").set_value(upload(DATA / "cartpole.parquet"))
+    app.file_uploader(key="other_log_file").set_value(upload(DATA / "cartpole.parquet"))
     app.run()
     assert "Nothing shows that the two logs differ" in texts(app)
 
 
 def test_a_log_of_something_else_is_refused() -> None:
     app = open_page("audit", data="cartpole")
-    app.file_uploader(key="log").set_value(upload(DATA / "pendulum.parquet"))
+    app.file_uploader(key="log_file").set_value(upload(DATA / "pendulum.parquet"))
     app.run()
     (sentence,) = errors(app)
     assert "the rules ask about 4 features and the log has no cart position" in sentence
+
+
+def address(app: AppTest) -> dict[str, str]:
+    """What the address says."""
+    values = {name: app.query_params[name] for name in app.query_params}
+    return {name: one if isinstance(one, str) else one[0] for name, one in values.items()}
+
+
+def logs() -> list[Item]:
+    with Library() as library:
+        return library.items("Ada", kind="log")
+
+
+def test_a_log_is_kept_at_once_and_its_answer_is_there_again_from_the_link() -> None:
+    app = open_page("audit", data="cartpole", support="0.01", confidence="0.9")
+    app.file_uploader(key="log_file").set_value(upload(DATA / "cartpole.parquet")).run()
+    app.file_uploader(key="other_log_file").set_value(upload(DATA / "cartpole.parquet")).run()
+    (item,) = logs()  # the same twice
+    assert (item.name, item.details["steps"]) == ("cartpole.parquet", 15_000)
+    link = address(app)
+    assert (link["log"], link["other_log"]) == (item.id, item.id)
+    again = open_page("audit", **link)
+    assert not errors(again)
+    assert metrics(again) == metrics(app)
+    assert "Nothing shows that the two logs differ" in texts(again)
+    app.button(key="keep_audit").click().run()
+    with Library() as library:
+        (kept,) = library.items("Ada", kind="result")
+        assert item.id in kept.came_from
+    again.button(key="leave_other_log").click().run()
+    assert "two logs differ" not in texts(again)
+    assert "other_log" not in address(again)
+
+
+def table(folder: Path) -> tuple[str, bytes, str]:
+    """A log with columns that nobody could know."""
+    log = load_demonstrations(DATA / "cartpole.parquet").select(range(2))
+    columns = dict(zip("abcd", log.observations.T, strict=True))
+    frame = pd.DataFrame({"run": log.episodes, **columns, "what": log.actions})
+    path = folder / "lab.csv"
+    frame.to_csv(path, index=False)
+    return upload(path)
+
+
+def test_what_was_said_of_the_columns_is_kept_with_the_log(tmp_path: Path) -> None:
+    app = open_page("audit", data="cartpole", support="0.01", confidence="0.9")
+    app.file_uploader(key="log_file").set_value(table(tmp_path)).run()
+    first = [item.id for item in logs()]
+    app.toggle(key="log_map_columns").set_value(True).run()
+    app.multiselect(key="log_map_observations").set_value(list("abcd")).run()
+    app.multiselect(key="log_map_actions").set_value(["what"]).run()
+    app.selectbox(key="log_map_episode").set_value("run").run()
+    app.button(key="log_map_read").click().run()
+    (mapped,) = (item for item in logs() if item.id not in first)
+    assert mapped.details["columns"]["run"] == "episode"
+    assert address(app)["log"] == mapped.id
+    again = open_page("audit", **address(app))
+    assert texts(again).count("lab.csv")
+    assert errors(again) == errors(app)
+
+
+@pytest.mark.parametrize(
+    ("named", "sentence"),
+    [
+        ("nonsense", "no log called 'nonsense'"),
+        ("a" * 26, "has nothing with the id"),
+        ("demonstrations", "is none"),
+        ("removed", "was removed by Ada"),
+        ("missing file", "is missing from the library"),
+    ],
+)
+def test_a_log_that_is_not_here_is_said_with_what_to_do(
+    place: Path, named: str, sentence: str
+) -> None:
+    app = open_page("audit", data="cartpole")
+    app.file_uploader(key="log_file").set_value(upload(DATA / "cartpole.parquet")).run()
+    (item,) = logs()
+    if named == "demonstrations":
+        own = open_page("demonstrations", data="upload")
+        own.file_uploader(key="upload_files").set_value([upload(DATA / "cartpole.parquet")]).run()
+        named = address(own)["data"]
+    elif named == "removed":
+        with Library() as library:
+            library.remove(item.id, author="Ada")
+        named = item.id
+    elif named == "missing file":
+        with Library() as library:
+            library.path(item).unlink()
+        named = item.id
+    app = open_page("audit", data="cartpole", log=named)
+    (said,) = errors(app)
+    assert sentence in said
+    assert not metrics(app)
+    app.button(key="go_on_without_log").click().run()
+    assert not errors(app)
+    assert "Upload a log" in texts(app)
+    assert "log" not in address(app)
+
+
+def test_a_log_stands_in_the_library_and_leads_to_the_audit() -> None:
+    app = open_page("audit", data="cartpole")
+    app.file_uploader(key="log_file").set_value(upload(DATA / "cartpole.parquet")).run()
+    (item,) = logs()
+    page = open_page("library", item=item.id)
+    assert not errors(page)
+    (link,) = (one for one in page.get("page_link") if one.proto.page == "audit")
+    assert link.proto.query_string == f"log={item.id}"
+
+
+def test_what_cannot_be_read_is_not_kept() -> None:
+    app = open_page("audit", data="cartpole")
+    app.file_uploader(key="log_file").set_value(("log.csv", b"nothing", "text/csv")).run()
+    assert len(errors(app)) == 1
+    assert logs() == []
+    assert "log" not in address(app)

@@ -113,7 +113,7 @@ def test_a_step_of_a_log_leads_to_what_if_with_what_was_observed() -> None:
     app = open_page("audit", data="cartpole", combine="every", confidence="0.9")
     name = "cartpole.parquet"
     log = (name, (DATA / name).read_bytes(), "application/octet-stream")
-    app.file_uploader(key="log").set_value(log).run()
+    app.file_uploader(key="log_file").set_value(log).run()
     assert not app.exception, app.exception
     (link,) = [one.proto for one in app.get("page_link") if one.proto.page == "what_if"]
     parameters = parse_qs(link.query_string)

@@ -57,7 +57,7 @@ def test_the_audit_says_it() -> None:
     approve()
     app = open_page("audit", data="cartpole", audited=COMBINED)
     content = LOG.read_bytes()
-    app.file_uploader(key="log").set_value((LOG.name, content, "")).run()
+    app.file_uploader(key="log_file").set_value((LOG.name, content, "")).run()
     assert not app.exception
     (line,) = lines(app)
     assert line.startswith("Approved by Eve on ")

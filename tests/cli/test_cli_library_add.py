@@ -46,6 +46,16 @@ def test_an_audit_is_kept_as_a_result_of_the_rules_and_the_log(run, tmp_path):
     assert told["paths"]["result"].endswith(".json")
 
 
+def test_a_log_is_kept_and_audited(run, tmp_path):
+    rules = added(run, RULES, "--kind", "rules")
+    log = added(run, CART, "--kind", "log", "--name", "March", "--about", rules["id"])
+    assert (log["name"], log["details"]["file_name"]) == ("March", "cartpole.parquet")
+    assert log["came_from"] == [rules["id"]]
+    assert log["id"] in run("library", "list", "--kind", "log")
+    answer = json.loads(run("audit", RULES, f"library:{log['id']}", "--json"))
+    assert answer["steps"] == 15_000
+
+
 def test_a_table_is_shown_as_one(run, tmp_path):
     table = tmp_path / "comparison.csv"
     table.write_text("agent,return\n" + "".join(f"agent {n},{n}\n" for n in range(30)))

@@ -92,7 +92,7 @@ def _downloads(logs: Logs, sign_off: SignOff | None) -> None:
         )
         download("JSON", partial(_json, logs, sign_off), f"{stem}.json", key="audit_json")
         download("Steps as CSV", partial(_steps, held), f"{stem}.csv", key="audit_csv")
-        keep_result_button(page, f"{stem}.html", key="keep_audit")
+        keep_result_button(page, f"{stem}.html", key="keep_audit", beside=lambda: logs.identifiers)
 
 
 def _page(logs: Logs, sign_off: SignOff | None) -> str:

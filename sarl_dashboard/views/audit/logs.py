@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
@@ -11,16 +12,21 @@ from streamlit.runtime.uploaded_file_manager import UploadedFile
 from sarl_core.auditing.audit import Audit, audit
 from sarl_core.auditing.comparison import LogComparison
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.formats import ColumnRole, read_demonstrations
+from sarl_core.demonstrations.formats import ColumnRole
 from sarl_core.errors import InputError, SarlError
+from sarl_core.library.logs import log_content, log_file_name, log_roles, read_log
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.column_form import ColumnForm
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import rule_set_choice
+from sarl_dashboard.state import library
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_choice import rules_for
+from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import escaped, in_full, refuse
+
+_LONGEST = 200  # signs of a name in an address
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,12 +51,14 @@ class Logs:
         comparison: With another one, or None.
         name: Of the first file.
         rule_set: As it was chosen; an audit orders it as the log is.
+        identifiers: Of the logs, as far as they are kept.
     """
 
     first: Audit
     comparison: LogComparison | None
     name: str
     rule_set: RuleSet
+    identifiers: tuple[str, ...] = ()
 
 
 def chosen_rules() -> ChosenRules:
@@ -75,61 +83,86 @@ def chosen_rules() -> ChosenRules:
 def chosen_logs(rules: ChosenRules) -> Logs:
     """The uploaders, and what came of the logs; stops the page while there is none.
 
+    What is uploaded is kept at once, and the address names it (URL: log, other_log).
+
     Args:
         rules: That are held against them.
     """
     left, right = st.columns(2)
-    first = left.file_uploader(
-        "Log",
-        key="log",
-        on_change=_forget,
-        args=("log",),
-        help=with_words(
+    with left:
+        log = _chosen(
+            "log",
+            "Log",
             "What somebody did, step by step, in any format that demonstrations are read in. "
-            "Features, actions and labels are matched by their names."
-        ),
-    )
-    second = right.file_uploader(
-        "Another log, as after a change (optional)",
-        key="other_log",
-        on_change=_forget,
-        args=("other_log",),
-        help=with_words("To compare with"),
-    )
-    if first is None:
+            "Features, actions and labels are matched by their names.",
+        )
+    with right:
+        after = _chosen("other_log", "Another log, as after a change (optional)", "To compare with")
+    for problem, key in ((log, "log"), (after, "other_log")):
+        if isinstance(problem, str):
+            refuse(problem)
+            st.button(
+                "Go on without it",
+                key=f"go_on_without_{key}",
+                icon=":material/arrow_forward:",
+                on_click=_leave,
+                args=(key,),
+            )
+    if isinstance(log, str) or isinstance(after, str):
+        st.stop()
+    if log is None:
         st.info(
             "Upload a log to hold these rules against it.",
             icon=":material/upload_file:",
         )
         st.stop()
-    log = _Log("log", first)
-    held = _answer(rules, log, log.stated)
+    held = _answer(rules, log, log.roles)
     other = None
-    if second is not None:
-        after = _Log("other_log", second)
+    if after is not None:
         # What was said of the columns of one log is true of another with the same columns.
-        said = log.stated if after.columns == log.columns else ()
-        other = _answer(rules, after, after.stated or said)
-    if held is None or (second is not None and other is None):
+        said = log.roles if after.columns == log.columns else ()
+        other = _answer(rules, after, after.roles or said)
+    if held is None or (after is not None and other is None):
         st.stop()
     comparison = None if other is None else LogComparison(held, other)
-    return Logs(held, comparison, first.name, rules.rule_set)
+    identifiers = tuple(
+        one.identifier for one in (log, after) if one is not None and one.identifier
+    )
+    return Logs(held, comparison, log.file.name, rules.rule_set, identifiers)
 
 
 _Roles = tuple[tuple[str, ColumnRole], ...]
 
 
+class _LibraryFile(NamedTuple):
+    """The file of a log that is kept, as an upload has it."""
+
+    file_id: str
+    name: str
+    content: bytes
+
+    def getvalue(self) -> bytes:
+        return self.content
+
+    def getbuffer(self) -> memoryview:
+        return memoryview(self.content)
+
+
 @dataclass(frozen=True, eq=False)
 class _Log:
-    """A log that was uploaded, and what was said of its columns.
+    """A log, and what was said of its columns.
 
     Attributes:
         key: Of its uploader.
-        file: The upload.
+        file: What was uploaded, or is kept.
+        roles: What was said of its columns, () where nothing was.
+        identifier: Under which it is kept; "" where it is not.
     """
 
     key: str
-    file: UploadedFile
+    file: UploadedFile | _LibraryFile
+    roles: _Roles
+    identifier: str
 
     @property
     def form(self) -> ColumnForm:
@@ -139,27 +172,71 @@ class _Log:
     def columns(self) -> tuple[str, ...]:
         return tuple(one.name for one in self.form.previews)
 
-    @property
-    def stated(self) -> _Roles:
-        """What was said of its columns, () where nothing was."""
-        roles: _Roles = st.session_state.get(f"_{self.key}_roles", ())
-        return roles
-
     def read(self) -> None:
         """Take the columns as they stand in the form; for a callback."""
         state = st.session_state
         try:
-            state[f"_{self.key}_roles"] = tuple(self.form.roles().items())
+            roles = tuple(self.form.roles().items())
+            state[f"_{self.key}_roles"] = roles
             state[f"_{self.key}_problem"] = None
+            _keep(self.key, self.file, roles)
         except InputError as error:
             state[f"_{self.key}_problem"] = str(error)
         state[f"_{self.key}_mapped"] = True
 
 
-def _forget(key: str) -> None:
-    """Say nothing of the columns of a new log yet; for a callback."""
-    for part in ("roles", "problem", "mapped", "seen"):
+def _chosen(key: str, label: str, hint: str) -> _Log | str | None:
+    """The uploader of a log; the log, why what the address names is none, or nothing."""
+    named = url_text(key, "", lambda text: len(text) <= _LONGEST)
+    uploaded = st.file_uploader(
+        label, key=f"{key}_file", on_change=_take, args=(key,), help=with_words(hint)
+    )
+    own: str = st.session_state.get(f"_{key}_id", "")
+    if uploaded is not None and named == own:
+        roles: _Roles = st.session_state.get(f"_{key}_roles", ())
+        return _Log(key, uploaded, roles, own)
+    if not named:
+        return None
+    try:
+        item = library.stored_log(named)
+        opened = library.library()
+        file = _LibraryFile(item.id, log_file_name(item), log_content(opened, item))
+        roles = tuple(log_roles(item).items())
+    except SarlError as error:
+        return str(error)
+    with st.container(horizontal=True, vertical_alignment="center"):
+        st.caption(f"**{escaped(file.name)}**, from the library", width="content")
+        st.button("Leave it", key=f"leave_{key}", on_click=_leave, args=(key,), type="tertiary")
+    return _Log(key, file, roles, item.id)
+
+
+def _take(key: str) -> None:
+    """Keep a log that was uploaded, so that the address can name it; for a callback."""
+    _leave(key)
+    file = st.session_state.get(f"{key}_file")
+    if file is not None:
+        _keep(key, file, ())
+
+
+def _keep(key: str, file: UploadedFile | _LibraryFile, roles: _Roles) -> None:
+    try:
+        _read(file.getvalue(), file.name, roles)
+    except SarlError:  # the page says why, and asks what its columns are
+        return
+    try:
+        identifier = library.keep_log(file.getvalue(), file.name, dict(roles)).id
+    except SarlError as error:
+        library.say_once(error)
+        return
+    st.session_state[f"_{key}_id"] = identifier
+    set_url_choice(key, identifier)
+
+
+def _leave(key: str) -> None:
+    """Have no log, and say nothing of the columns of the next one yet; for a callback."""
+    for part in ("id", "roles", "problem", "mapped", "seen"):
         st.session_state.pop(f"_{key}_{part}", None)
+    set_url_choice(key, "")
 
 
 def _answer(rules: ChosenRules, log: _Log, roles: _Roles) -> Audit | None:
@@ -171,8 +248,8 @@ def _answer(rules: ChosenRules, log: _Log, roles: _Roles) -> Audit | None:
             held = _audited(rules, log.file, roles)
         except SarlError as error:
             problem = str(error)
-    if not state.get(f"_{log.key}_seen"):  # closed by the visitor, it stays closed
-        state[f"_{log.key}_seen"] = True
+    if state.get(f"_{log.key}_seen") != log.file.file_id:  # closed by the visitor, it stays closed
+        state[f"_{log.key}_seen"] = log.file.file_id
         state[f"{form.key}_columns"] = False
         if problem is not None:
             form.open_for(problem)
@@ -185,7 +262,7 @@ def _answer(rules: ChosenRules, log: _Log, roles: _Roles) -> Audit | None:
     return held
 
 
-def _audited(rules: ChosenRules, file: UploadedFile, roles: _Roles) -> Audit:
+def _audited(rules: ChosenRules, file: UploadedFile | _LibraryFile, roles: _Roles) -> Audit:
     demonstrations = chosen_demonstrations()
     mined_from_them = (
         demonstrations is not None and demonstrations.digest == rules.rule_set.source.digest
@@ -211,6 +288,9 @@ def _held(
     roles: _Roles,
     demonstrations: Demonstrations | None,
 ) -> Audit:
-    # States that are none are said, and nothing is held against them.
-    log = read_demonstrations(content, name, columns=dict(roles) or None, missing="drop")
-    return audit(rule_set, log, demonstrations=demonstrations)
+    return audit(rule_set, _read(content, name, roles), demonstrations=demonstrations)
+
+
+@cached(show_spinner="Reading the log …")
+def _read(content: bytes, name: str, roles: _Roles) -> Demonstrations:
+    return read_log(content, name, dict(roles))

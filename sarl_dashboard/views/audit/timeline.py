@@ -62,7 +62,7 @@ def _chosen_episode(held: Audit) -> slice:
     }
     if st.session_state.get("log_episode") not in names:
         st.session_state.pop("log_episode", None)
-    choice = st.selectbox("Episode", list(names), key="log_episode", width=320)
+    choice = st.selectbox("Episode", list(names), key="log_episode", bind="query-params", width=320)
     place = names[choice]
     start = int(held.log.episode_starts[place])
     length = int(held.log.episode_lengths[place])

@@ -102,6 +102,13 @@ def _buttons(opened: Library, item: Item, author: str, *, own: bool) -> None:
                 help="On every page, with the data that they are from; the address is a link for "
                 "others.",
             )
+        if item.kind == "log":
+            st.page_link(
+                "audit.py",
+                label="Hold rules against it",
+                icon=":material/fact_check:",
+                query_params={"log": item.id},
+            )
         if item.kind in UNLISTED:
             return
         download(

@@ -10,6 +10,7 @@ from PIL import Image
 
 from sarl_core.errors import SarlError
 from sarl_core.library import Item, Library
+from sarl_core.library.logs import log_file_name
 from sarl_core.library.results import note_text, result_view
 from sarl_dashboard.components.downloads import MIMES, download
 from sarl_dashboard.components.tables import table_height
@@ -34,6 +35,12 @@ def show_content(opened: Library, item: Item) -> None:
             st.text(note_text(opened, item))
         elif item.kind == "result":
             _show_result(opened, item)
+        elif item.kind == "log":
+            path = opened.path(item)
+            if path.suffix in MIMES:
+                download(
+                    "Download", path.read_bytes, log_file_name(item), key="library_file_of_log"
+                )
     except SarlError as error:
         refuse(error)
 

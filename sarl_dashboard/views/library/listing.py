@@ -24,6 +24,7 @@ KINDS = {
     "rules": "Rules",
     "result": "Result",
     "note": "Note",
+    "log": "Log",
 }
 _LONGEST = 200  # signs of a name in an address
 _FORMS = {
