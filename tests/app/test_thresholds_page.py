@@ -170,7 +170,7 @@ def test_the_learner_is_chosen_and_said_and_in_the_link() -> None:
     trees = grow_policy_trees(load_demonstrations(DATA / "cartpole.parquet"), learner="histogram")
     rules = mine_rules(trees, supp_min=0.005, conf_min=0.95)
     assert metrics(app)["Rules"] == f"{rules.rule_count:,}"
-    assert app.query_params["learner"] == ["histogram"]
+    assert app.query_params["learner"] == "histogram"
     linked = open_page("thresholds", data="cartpole", learner="histogram")
     assert metrics(linked) == metrics(app)
     assert "Learner: exact" in str(

@@ -14,7 +14,7 @@ from PIL import Image
 
 from sarl_core import RuleSet, grow_policy_trees, load_demonstrations, mine_rules
 from sarl_core.cli.app import main
-from sarl_core.explaining.words import growth as words
+from sarl_core.explaining.words import growth as growth_words
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.growing import growth
 
@@ -422,11 +422,11 @@ def test_mine_grows_trees_by_the_learner_that_is_named(run, tmp_path):
 
 def test_mine_says_that_many_steps_waited_for_want_of_the_other_learner(run, tmp_path, monkeypatch):
     monkeypatch.setattr(growth, "EXACT_UP_TO", 1_000)
-    monkeypatch.setattr(words, "EXACT_UP_TO", 1_000)
+    monkeypatch.setattr(growth_words, "EXACT_UP_TO", 1_000)
     path = tmp_path / "rules.json"
     options = ("--setting", "filtered", "--out", path)
     assert "histogram" in run("mine", LANDER, *options)
-    for place in (growth, words):
+    for place in (growth, growth_words):
         monkeypatch.setattr(place, "is_installed", lambda: False)
     answer = run("mine", LANDER, *options)
     assert "pip install 'sarl-explorer[large]'" in " ".join(answer.split())
