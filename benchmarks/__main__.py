@@ -19,6 +19,7 @@ ROWS = {
     "tree-included": "mining.tree_included",
     "tree-given": "mining.tree_given",
     "plane": "mining.plane",
+    "large": "large.mining",
     "combinations": "mining.combinations",
     "decision": "shielding.decision",
     "batch": "shielding.batch",

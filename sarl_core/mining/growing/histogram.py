@@ -22,6 +22,7 @@ from sarl_core.mining.tree import LEAF
 
 BINS = 1_024
 """Of a feature, at most."""
+_MOST_BINS = 64 * BINS  # the bins are made: the learner is to throw none of them together
 
 
 def is_installed() -> bool:
@@ -57,11 +58,16 @@ class BinnedStates:
         numbers = np.empty(observations.shape, dtype=np.float32)
 
         def bin_feature(index: int) -> NDArray[np.float64]:
-            # A formula may be infinite; thresholds lie below the limit.
-            values = np.clip(observations[:, index], -LARGEST, LARGEST)
-            borders = _borders(values)
-            numbers[:, index] = np.searchsorted(borders, values.astype(np.float64))
-            return borders
+            # A formula may be infinite, and thresholds lie below the limit; NaN is at most none.
+            values = np.fmax(np.fmin(observations[:, index], LARGEST), -LARGEST)
+            # Much faster than to search the bin of each value.
+            order = np.argsort(values)
+            ascending = values[order]
+            ends = _bin_ends(ascending)
+            sizes = np.diff(ends, prepend=0, append=len(values))
+            numbers[order, index] = np.repeat(np.arange(len(sizes)), sizes)
+            # Exact, and strictly between the two: float64 has more than twice the digits.
+            return (ascending[ends - 1].astype(np.float64) + ascending[ends]) / 2
 
         with ThreadPoolExecutor(cpu_count()) as threads:  # sorting and searching let others run
             borders = tuple(threads.map(bin_feature, range(observations.shape[1])))
@@ -101,7 +107,7 @@ def histogram_structure(
         max_features=None,
         min_samples_split=max(2, least),
         max_depth=max_depth,
-        max_bins=len(labels) + 1,  # the bins are made; none may be thrown together
+        max_bins=_MOST_BINS,
         random_state=seed,
     )
     # Beside the main thread it takes all cores, which is what it does in it, too, and warns.
@@ -122,12 +128,10 @@ def histogram_structure(
     )
 
 
-def _borders(values: NDArray[np.float32]) -> NDArray[np.float64]:
-    """Halfway between two neighbouring values, each after about as many states."""
-    ascending = np.sort(values)
+def _bin_ends(ascending: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Behind which of the ascending values a bin ends: after about as many each, of equals all."""
     ends = np.flatnonzero(ascending[1:] != ascending[:-1]) + 1
     if len(ends) >= BINS:
-        count = np.arange(1, BINS) * len(values) // BINS
-        ends = np.unique(ends[np.minimum(np.searchsorted(ends, count), len(ends) - 1)])
-    # Exact, and strictly between the two: float64 has more than twice the digits.
-    return (ascending[ends - 1].astype(np.float64) + ascending[ends]) / 2
+        wanted = np.arange(1, BINS) * len(ascending) // BINS
+        ends = np.unique(ends[np.minimum(np.searchsorted(ends, wanted), len(ends) - 1)])
+    return ends
