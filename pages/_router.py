@@ -9,6 +9,7 @@ import streamlit as st
 from sarl_core.explaining.templates import style_sheet
 from sarl_dashboard.components.journey.brand import ICON, show_logo
 from sarl_dashboard.components.journey.first_run import show_first_run
+from sarl_dashboard.components.journey.growing import require_trees
 from sarl_dashboard.components.journey.next_step import next_step
 from sarl_dashboard.components.journey.words import words_button
 from sarl_dashboard.components.sidebar import (
@@ -114,6 +115,7 @@ try:
     if page.title != "Library":
         require_data(page.title)
     if page.title not in WITHOUT_RULES:
+        require_trees(page.title)
         require_rules(page.title)
     show_first_run(page.title)
     page.run()

@@ -33,16 +33,19 @@ Arguments = ParamSpec("Arguments")
 class Processes(Executor):
     """Processes that end with this one; they start when first needed, and anew after a loss."""
 
-    def __init__(self, workers: int | None = None, *, gives_way: bool = False) -> None:
+    def __init__(
+        self, workers: int | None = None, *, gives_way: bool = False, threads: int = 1
+    ) -> None:
         """Start nothing yet.
 
         Args:
             workers: Processes; as many as there are processors where not given, at most 8.
             gives_way: Whether other programs go first, as where pages are served meanwhile. On a
                 busy machine the work then takes long; where somebody waits for it, it should not.
+            threads: Of each, where what it calls can use several.
         """
         self.workers = workers or min(os.cpu_count() or 1, 8)
-        self._gives_way = gives_way
+        self._gives_way, self._threads = gives_way, threads
         self._lock = Lock()
         self._processes: Any = None
 
@@ -67,7 +70,7 @@ class Processes(Executor):
                 timeout=_IDLE_SECONDS,
                 initializer=_begin,
                 initargs=(os.getpid(), self._gives_way),
-                env={"OMP_NUM_THREADS": "1"},
+                env={"OMP_NUM_THREADS": str(self._threads)},
             )
             return self._submitted(call, *arguments, **named)
 

@@ -15,7 +15,7 @@ from dataclasses import fields, is_dataclass
 from operator import attrgetter
 from pathlib import Path
 from threading import Lock, Thread
-from typing import Any, ParamSpec, TypeVar, cast
+from typing import Any, Generic, ParamSpec, TypeVar, cast
 
 import numpy as np
 import streamlit as st
@@ -88,9 +88,47 @@ def key_of(value: object, hash_funcs: HashFuncs = HASH_FUNCS) -> object:
     )
 
 
+class Cached(Generic[P, R]):
+    """A function of which results are kept."""
+
+    def __init__(self, function: Callable[P, R], spinner: str, hash_funcs: HashFuncs) -> None:
+        functools.update_wrapper(self, function)
+        self._function, self._spinner, self._hash_funcs = function, spinner, hash_funcs
+        self._signature = inspect.signature(function)
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """What the function gives."""
+        key = self._key(*args, **kwargs)
+        entry = RESULTS.get(key)
+        if entry is None:
+            with _making[key]:  # one visitor makes it, the others wait
+                entry = RESULTS.get(key)
+                if entry is None:
+                    with _spinner(self._spinner):
+                        entry = (self._function(*args, **kwargs),)
+                    keep(key, entry, owner())
+            _making.pop(key, None)
+        return cast(tuple[R], entry)[0]
+
+    def holds(self, *args: P.args, **kwargs: P.kwargs) -> bool:
+        """Whether there is a result for these arguments already."""
+        return self._key(*args, **kwargs) in RESULTS
+
+    def keeping(self, *args: P.args, **kwargs: P.kwargs) -> Callable[[R], None]:
+        """What keeps a result that is made elsewhere, from a thread without a session, too."""
+        key, session = self._key(*args, **kwargs), owner()
+        return lambda result: keep(key, (result,), session)
+
+    def _key(self, *args: P.args, **kwargs: P.kwargs) -> object:
+        bound = self._signature.bind(*args, **kwargs)
+        bound.apply_defaults()
+        code = cast(Any, self._function).__code__  # another one once the file was edited
+        return code.co_filename, code, key_of(tuple(bound.arguments.values()), self._hash_funcs)
+
+
 def cached(
     *, show_spinner: str = "", hash_funcs: HashFuncs | None = None
-) -> Callable[[Callable[P, R]], Callable[P, R]]:
+) -> Callable[[Callable[P, R]], Cached[P, R]]:
     """Keep what a function gives, for all visitors, as long as there is room.
 
     Results are found again by the content of all arguments (`key_of`). Streamlit's own cache of
@@ -105,30 +143,7 @@ def cached(
         A decorator.
     """
     by_type = {**HASH_FUNCS, **(hash_funcs or {})}
-
-    def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        signature = inspect.signature(function)
-        code = cast(Any, function).__code__  # another one once the file was edited
-
-        @functools.wraps(function)
-        def call(*args: P.args, **kwargs: P.kwargs) -> R:
-            bound = signature.bind(*args, **kwargs)
-            bound.apply_defaults()
-            key = (code.co_filename, code, key_of(tuple(bound.arguments.values()), by_type))
-            entry = RESULTS.get(key)
-            if entry is None:
-                with _making[key]:  # one visitor makes it, the others wait
-                    entry = RESULTS.get(key)
-                    if entry is None:
-                        with _spinner(show_spinner):
-                            entry = (function(*args, **kwargs),)
-                        keep(key, entry, owner())
-                _making.pop(key, None)
-            return cast(tuple[R], entry)[0]
-
-        return call
-
-    return decorate
+    return lambda function: Cached(function, show_spinner, by_type)
 
 
 def keep(key: object, result: object, owner: str) -> None:

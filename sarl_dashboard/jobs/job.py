@@ -54,7 +54,8 @@ class Job(Generic[Result]):
             result: What there is of it before it begins.
         """
         self.key, self.result = key, result
-        self.total, self.done, self.text = total, 0, "Starting …"
+        self.total, self.text = total, "Starting …"
+        self.done: float = 0
         self.error: SarlError | None = None
         self._work = work
         self._cancelled = self._finished = False

@@ -35,7 +35,8 @@ Trees = tuple[PolicyTree, ...]
     show_spinner="Growing the decision tree …",
     hash_funcs={Demonstrations: attrgetter("pairs_digest")},
 )
-def _grown_under_any_name(demonstrations: Demonstrations, divider: int, learner: Learner) -> Trees:
+def trees_under_any_name(demonstrations: Demonstrations, divider: int, learner: Learner) -> Trees:
+    """Trees of the same pairs, whatever their features are called."""
     return grow_policy_trees(demonstrations, divider=divider, learner=learner)
 
 
@@ -52,14 +53,21 @@ def grown_trees(
     Returns:
         Shared between sessions (they are immutable).
     """
+    return _grown(*growing_of(demonstrations, divider, learner))
+
+
+def growing_of(
+    demonstrations: Demonstrations, divider: int, learner: Learner | None = None
+) -> tuple[Demonstrations, int, Learner]:
+    """What trees depend on: the demonstrations, the divider that is meant, and the learner."""
     if demonstrations.is_discrete:
         divider = MIN_DIVIDER
-    return _grown(demonstrations, divider, learner or learner_of(demonstrations))
+    return demonstrations, divider, learner or learner_of(demonstrations)
 
 
 @cached()
 def _grown(demonstrations: Demonstrations, divider: int, learner: Learner) -> Trees:
-    return renamed_trees(_grown_under_any_name(demonstrations, divider, learner), demonstrations)
+    return renamed_trees(trees_under_any_name(demonstrations, divider, learner), demonstrations)
 
 
 def learner_of(demonstrations: Demonstrations) -> Learner:

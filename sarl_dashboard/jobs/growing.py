@@ -1,0 +1,80 @@
+"""Trees of many pairs, grown in a process of their own, so that one can call it off."""
+
+from __future__ import annotations
+
+import os
+import time
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.growing.growth import EXACT_UP_TO, grow_policy_trees
+from sarl_core.mining.tree import Learner
+from sarl_core.processes import Processes, run_each
+from sarl_dashboard.jobs.job import Job, Place
+from sarl_dashboard.state.mined import Trees, growing_of, learner_of, trees_under_any_name
+
+PLACE = Place[Trees]("growing")
+_SECONDS: dict[Learner, float] = {"exact": 4e-6, "histogram": 6e-7}
+"""For each value of a state and action dimension, on two cores."""
+_START = 4.0  # seconds until a process is there and has the states
+_MOST = 0.95  # of a bar that only knows how long such work usually takes
+
+
+def is_long(demonstrations: Demonstrations) -> bool:
+    """Whether growing the trees of demonstrations takes more than a moment."""
+    return len(demonstrations) > EXACT_UP_TO
+
+
+def key_of(demonstrations: Demonstrations, divider: int) -> tuple[object, ...]:
+    """What the trees depend on."""
+    _, *others = growing_of(demonstrations, divider)
+    return (demonstrations.pairs_digest, *others)
+
+
+def is_done(demonstrations: Demonstrations, divider: int) -> bool:
+    """Whether the trees are there."""
+    return trees_under_any_name.holds(*growing_of(demonstrations, divider))
+
+
+def job_of(demonstrations: Demonstrations, divider: int) -> Job[Trees]:
+    """Begin to grow them."""
+    arguments = growing_of(demonstrations, divider)
+    keep = trees_under_any_name.keeping(*arguments)
+    steps = len(demonstrations)
+    values = demonstrations.observations.size * demonstrations.action_columns.shape[1]
+    expected = _START + _SECONDS[learner_of(demonstrations)] * values
+
+    def work(job: Job[Trees]) -> None:
+        begun = time.monotonic()
+
+        def progress(done: int, total: int) -> bool:
+            seconds = time.monotonic() - begun
+            job.text = (
+                f"Growing the decision tree of {steps:,} states: {seconds:.0f} s of about "
+                f"{expected:.0f} s"
+            )
+            job.done = min(seconds / expected, _MOST)
+            return job.wanted()
+
+        # Its own process, since growing a tree can be ended in no other way.
+        executor = Processes(1, threads=os.cpu_count() or 1)
+        try:
+            (trees,) = run_each(grown, [arguments], executor=executor, progress=progress)
+        finally:
+            executor.shutdown(wait=False, cancel_futures=True)
+        keep(trees)
+
+    return Job(key_of(demonstrations, divider), work, 1)
+
+
+def grown(demonstrations: Demonstrations, divider: int, learner: Learner) -> Trees:
+    """As `grow_policy_trees`, for a process.
+
+    Args:
+        demonstrations: N pairs.
+        divider: Number of intervals of continuous dimensions.
+        learner: What grows them.
+
+    Returns:
+        One tree an action dimension.
+    """
+    return grow_policy_trees(demonstrations, divider=divider, learner=learner)
