@@ -89,3 +89,13 @@ def test_what_went_wrong_is_said_with_a_way_to_try_again(monkeypatch: pytest.Mon
     app.run()
     assert errors(app) == ["The memory is full; close something."]
     assert app.button(key="run_growing").label == "Grow the tree"
+
+
+def test_of_many_states_nobody_waits_for_all_rules_to_compare_with() -> None:
+    app = open_page("difference", data="cartpole", support="0.02")
+    until = time.monotonic() + WAIT
+    while work_of(app).running and time.monotonic() < until:
+        time.sleep(0.1)
+    app.run()
+    assert app.multiselect(key="_sets_choice").value == ["in force", "filtered"]
+    assert not app.exception

@@ -8,11 +8,15 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import FILTERED
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import RULE_SETS, offered_rule_sets, rule_sets_help
+from sarl_dashboard.jobs import growing
 from sarl_dashboard.state import in_force, rule_base
+from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_choice import BETWEEN, rules_for
 from sarl_dashboard.state.rule_files import EDITED, IN_FORCE, UNEDITED
+from sarl_dashboard.state.thresholds import chosen_thresholds
 from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import in_full
 
@@ -75,12 +79,21 @@ def chosen_sides() -> list[Side]:
 
 
 def _named() -> list[str]:
-    usual = (UNEDITED, EDITED) if in_force.is_edited() else (IN_FORCE, "unfiltered")
+    usual: tuple[str, ...] = (UNEDITED, EDITED) if in_force.is_edited() else (IN_FORCE, _usual())
     before = [st.query_params.get(name, "") for name in ("first", "second")]
     if all(before) and "sets" not in st.query_params:  # an address of when there were two
         usual = (before[0], before[1])
     text = url_text("sets", "", lambda text: len(text) <= _LONGEST) or BETWEEN.join(usual)
     return list(dict.fromkeys(filter(None, text.split(BETWEEN))))[:MOST]
+
+
+def _usual() -> str:
+    """What the rules in force are held against first; of many states there are too many rules."""
+    demonstrations = chosen_demonstrations()
+    many = demonstrations is not None and growing.is_long(demonstrations)
+    if not many:
+        return "unfiltered"
+    return "" if chosen_thresholds() == FILTERED else "filtered"
 
 
 def _choose() -> None:
