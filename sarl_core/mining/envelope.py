@@ -114,7 +114,7 @@ def _boxes(
         corners[3, :, feature] = ordered[start + count - 1]
     boxes: list[DataBox | None] = [None] * n_rules
     for place, sides in zip(there.tolist(), np.moveaxis(corners, 1, 0).tolist(), strict=True):
-        boxes[place] = DataBox(*map(tuple, sides))
+        boxes[place] = DataBox(*sides)
     return boxes
 
 

@@ -8,8 +8,11 @@ numbers is what is told, and how far they spread says how sure it is.
 
 from __future__ import annotations
 
+import sys
+from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,8 +27,11 @@ Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 
-class DataBox(NamedTuple):
+class DataBox(Sequence[tuple[float, ...]]):
     """Where the pairs of a rule lay: its half-spaces reach further than they did.
+
+    A sequence of its four sides. It holds bare numbers: as objects, those of a hundred thousand
+    rules would take four times the memory of all else that the rules are.
 
     Attributes:
         least: Least value of each feature, (d,), exact float32 numbers.
@@ -34,10 +40,75 @@ class DataBox(NamedTuple):
         most: Largest value of each feature, (d,), exact float32 numbers.
     """
 
-    least: tuple[float, ...]
-    low: tuple[float, ...]
-    high: tuple[float, ...]
-    most: tuple[float, ...]
+    __slots__ = ("_numbers",)
+    _fields = ("least", "low", "high", "most")
+
+    def __init__(
+        self,
+        least: Sequence[float],
+        low: Sequence[float],
+        high: Sequence[float],
+        most: Sequence[float],
+    ) -> None:
+        self._numbers = array("d", (*least, *low, *high, *most))
+
+    def __len__(self) -> int:
+        """Four."""
+        return len(self._fields)
+
+    @overload
+    def __getitem__(self, place: int) -> tuple[float, ...]: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[tuple[float, ...], ...]: ...
+    def __getitem__(self, place: int | slice) -> tuple[float, ...] | tuple[tuple[float, ...], ...]:
+        """The side at a place, from 0; of a slice, those sides."""
+        d = len(self._numbers) // len(self._fields)
+        starts = range(0, len(self._fields) * d, d) if d else (0,) * len(self._fields)
+        if isinstance(place, slice):
+            return tuple(tuple(self._numbers[start : start + d]) for start in starts[place])
+        start = starts[place]
+        return tuple(self._numbers[start : start + d])
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all numbers are the same."""
+        return isinstance(other, DataBox) and self._numbers == other._numbers
+
+    def __hash__(self) -> int:
+        """As of the numbers."""
+        return hash(tuple(self._numbers))
+
+    def __repr__(self) -> str:
+        """All of it."""
+        sides = (f"{name}={side!r}" for name, side in zip(self._fields, self, strict=True))
+        return f"DataBox({', '.join(sides)})"
+
+    def __sizeof__(self) -> int:
+        """With its numbers."""
+        return object.__sizeof__(self) + sys.getsizeof(self._numbers)
+
+    @property
+    def least(self) -> tuple[float, ...]:
+        """Least value of each feature, (d,)."""
+        return self[0]
+
+    @property
+    def low(self) -> tuple[float, ...]:
+        """The 1 % quantile of each feature, (d,)."""
+        return self[1]
+
+    @property
+    def high(self) -> tuple[float, ...]:
+        """The 99 % quantile of each feature, (d,)."""
+        return self[2]
+
+    @property
+    def most(self) -> tuple[float, ...]:
+        """Largest value of each feature, (d,)."""
+        return self[3]
+
+    def by_name(self) -> dict[str, tuple[float, ...]]:
+        """The four sides, each under what it is called."""
+        return dict(zip(self._fields, self, strict=True))
 
 
 class Interval(NamedTuple):

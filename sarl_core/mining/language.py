@@ -15,7 +15,7 @@ from sarl_core.environments.formulas import Formula
 from sarl_core.mining.digits import amount_text, limit_texts
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_contents import RuleContents
-from sarl_core.mining.rules import Bounds, Condition, Rule
+from sarl_core.mining.rules import Bounds, Condition, Rule, share_bounds
 
 _DIGITS = 3
 _OFF = 0.1  # of the difference of two numbers, that each may be off
@@ -23,6 +23,7 @@ _LONGEST = 120
 _IS = " is "
 _IS_NOT = " is not "
 _FLAG_WORDS = ("contact",)
+_THE = "the {}".format
 # Labels that say nothing without the action that they are of.
 _NO_ACTIONS = {"true", "false", "yes", "no", "on", "off", "none", "t", "f", "y", "n"}
 
@@ -237,12 +238,15 @@ def neither_text(entry: Sequence[Bounds], features: Sequence[Feature]) -> str | 
 
 
 def _condition_texts(
-    rule: Rule, features: Sequence[Feature], text: Callable[[Bounds], str], *, the: str = ""
+    rule: Rule,
+    features: Sequence[Feature],
+    text: Callable[[Bounds], str],
+    of_words: Callable[[str], str] = str,
 ) -> list[str]:
     texts: list[str] = []
     for entry in least_conditions(rule, features):
         neither = neither_text(entry, features)
-        texts += map(text, entry) if neither is None else [f"{the}{neither}"]
+        texts += map(text, entry) if neither is None else [of_words(neither)]
     return texts
 
 
@@ -429,14 +433,19 @@ def sentence(
         others; and of `state` if the rule applies there.
     """
     features = rule_set.source.features
-    action = action_text(rule.action, rule_set.actions[rule.dimension])
     values = [] if state is None else extended_state(np.asarray(state).tolist(), features)
 
     def text_of(bounds: Bounds) -> str:
         beside = (float(values[bounds.feature]),) if len(values) else ()
         return condition_text(bounds, features[bounds.feature], beside=beside)
 
-    parts = _condition_texts(rule, features, text_of, the="the ")
+    parts = _condition_texts(rule, features, text_of, _THE)
+    action = action_text(rule.action, rule_set.actions[rule.dimension])
+    return _sentence(rule, parts, action, evidence=evidence)
+
+
+def _sentence(rule: Rule, parts: Sequence[str], action: str, *, evidence: bool) -> str:
+    """A sentence of its conditions and of what follows."""
     if not parts:
         text = f"Always {action}"
     elif len(parts) == 1:
@@ -447,6 +456,75 @@ def sentence(
         return f"{text}."
     states = "1 state" if rule.samples == 1 else f"{rule.samples:,} states"
     return f"{text}: so did the expert in {share_text(rule.confidence)} of {states}."
+
+
+class BoundsTexts(dict[Bounds, str]):
+    """Texts of intervals: many rules ask for the same one, which is written once.
+
+    Args:
+        write: Writes one.
+    """
+
+    def __init__(self, write: Callable[[Bounds], str]) -> None:
+        super().__init__()
+        self._write = write
+
+    def __missing__(self, bounds: Bounds) -> str:
+        text = self[bounds] = self._write(bounds)
+        return text
+
+
+class Wording:
+    """All rules of a set in words: `sentence`, `conditions_text` and so on, for many of them.
+
+    Args:
+        rule_set: Whose rules they are.
+    """
+
+    def __init__(self, rule_set: RuleContents) -> None:
+        share_bounds(rule_set.rules)
+        self._features = features = rule_set.source.features
+        self._any_words = any(feature.indicator is not None for feature in features)
+        self._long = BoundsTexts(lambda one: condition_text(one, features[one.feature]))
+        self._short = BoundsTexts(lambda one: short_condition(one, features[one.feature]))
+        self._actions = [
+            [action_text(label, dimension) for label in range(dimension.n_labels)]
+            for dimension in rule_set.actions
+        ]
+
+    def action(self, rule: Rule) -> str:
+        """As `action_text`."""
+        return self._actions[rule.dimension][rule.action]
+
+    def conditions(self, rule: Rule) -> str:
+        """As `conditions_text`."""
+        return " and ".join(self.texts(rule, self._short)) or "always"
+
+    def sentence(self, rule: Rule, *, evidence: bool = True) -> str:
+        """As `sentence`."""
+        parts = self.texts(rule, self._long, _THE)
+        return _sentence(rule, parts, self.action(rule), evidence=evidence)
+
+    def merged_length(self, rule: Rule) -> int:
+        """As `merged_length`."""
+        return merged_length(rule, self._features) if self._any_words else len(rule.bounds)
+
+    def texts(
+        self, rule: Rule, texts: BoundsTexts, of_words: Callable[[str], str] = str
+    ) -> list[str]:
+        """What a rule asks, in texts of its intervals.
+
+        Args:
+            rule: One of the set.
+            texts: Of intervals.
+            of_words: Writes what is said of several words of a column at once.
+
+        Returns:
+            One text a feature or a column of words.
+        """
+        if self._any_words:
+            return _condition_texts(rule, self._features, texts.__getitem__, of_words)
+        return list(map(texts.__getitem__, rule.bounds))
 
 
 def formula_texts(rule_set: RuleContents) -> list[str]:
@@ -502,5 +580,7 @@ def one_line(text: str) -> str:
     Returns:
         The text, with a space for every sign that cannot be seen.
     """
+    if len(text) <= _LONGEST and text.isprintable():
+        return text
     printable = "".join(sign if sign.isprintable() else " " for sign in text[: _LONGEST + 1])
     return printable if len(printable) <= _LONGEST else f"{printable[:_LONGEST]}..."

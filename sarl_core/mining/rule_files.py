@@ -141,24 +141,42 @@ def _value(value: Any, depth: int, indented: bool) -> str:
     return text.replace("\n", "\n" + " " * depth)  # texts hold none: there it is an escape
 
 
-def _rule_lines(rules: Iterable[Rule]) -> Iterator[str]:
-    """The same of many rules: a query that they share is written once."""
-    written = cache(lambda condition: _JSON.encode(_condition(condition)))
+def _rule_lines(rules: Sequence[Rule]) -> Iterator[str]:
+    """The same of many rules: what they share is written once, and boxes in the fast way."""
+    query = cache(_query_text)
     for rule in rules:
-        queries = ", ".join(map(written, rule.conditions))
-        # Within a text of JSON no quotation mark stands by itself: this is the key.
-        line = _JSON.encode(rule_document(rule, []))
-        before, _, after = line.partition('"conditions": []')
-        yield f'{before}"conditions": [{queries}]{after}'
+        queries = ", ".join(map(query, rule.conditions))
+        box = "" if rule.box is None else _box_text(rule.box)
+        # Within a text of JSON no quotation mark stands by itself: these are the keys.
+        line = _JSON.encode(rule_document(rule, [], {} if box else None))
+        line = line.replace('"conditions": []', f'"conditions": [{queries}]', 1)
+        yield line.replace('"box": {}', f'"box": {box}', 1) if box else line
+
+
+def _query_text(condition: Condition) -> str:
+    """A query on one line, as `json` writes it."""
+    feature, op, threshold = condition
+    if not math.isfinite(threshold):
+        return _JSON.encode(_condition(condition))  # which refuses it
+    return f'{{"feature": {feature}, "op": "{op}", "threshold": {_number(threshold)!r}}}'
+
+
+def _box_text(box: DataBox) -> str:
+    """A box on one line, as `json` writes it; it takes most of the room in a file of many rules."""
+    text = msgspec.json.encode(tuple(box)).decode()
+    if "e" in text or "null" in text or "0.0000" in text:  # which `json` writes otherwise
+        return _JSON.encode(_box(box))
+    least, low, high, most = text[2:-2].replace(",", ", ").split("], [")
+    return f'{{"least": [{least}], "low": [{low}], "high": [{high}], "most": [{most}]}}'
 
 
 def _document(rule_set: RuleContents) -> dict[str, Any]:
     """What stands under each key: a value of JSON, or what makes those of a list one by one."""
     source, thresholds = rule_set.source, rule_set.thresholds
+    queries: set[Condition] = set().union(*(rule.conditions for rule in rule_set.rules))
     by_feature: list[set[float]] = [set() for _ in source.features]
-    for rule in rule_set.rules:
-        for feature, _, threshold in rule.conditions:
-            by_feature[feature].add(threshold)
+    for feature, _, threshold in queries:
+        by_feature[feature].add(threshold)
     return {
         "format": FORMAT,
         "version": 2 if _needs_version_2(rule_set) else 1,
@@ -242,12 +260,21 @@ def _condition(condition: Condition) -> dict[str, Any]:
     return {"feature": feature, "op": op, "threshold": _number(threshold)}
 
 
-def rule_document(rule: Rule, conditions: list[dict[str, Any]] | None = None) -> dict[str, Any]:
+def _box(box: DataBox) -> dict[str, Any]:
+    return {name: list(values) for name, values in box.by_name().items()}
+
+
+def rule_document(
+    rule: Rule,
+    conditions: list[dict[str, Any]] | None = None,
+    box: dict[str, Any] | None = None,
+) -> dict[str, Any]:
     """A rule as the file has it.
 
     Args:
         rule: To write.
         conditions: Its conditions as the file has them, where they are at hand.
+        box: Its box as the file has it, where that is at hand.
     """
     if conditions is None:
         conditions = list(map(_condition, rule.conditions))
@@ -269,7 +296,7 @@ def rule_document(rule: Rule, conditions: list[dict[str, Any]] | None = None) ->
     if rule.pinned:
         entry["pinned"] = True
     if rule.box is not None:
-        entry["box"] = {name: list(values) for name, values in rule.box._asdict().items()}
+        entry["box"] = _box(rule.box) if box is None else box
     if rule.held_out is not None:
         entry["held_out"] = rule.held_out._asdict()
     return entry
@@ -412,14 +439,13 @@ class _Box(DocumentPart):
     most: tuple[Number, ...]
 
     def read(self, n_features: int) -> DataBox:
-        box = DataBox(*astuple(self))
-        for name, values in box._asdict().items():
+        for name, values in asdict(self).items():
             if len(values) != n_features:
                 raise MisfitError(f"{name!r} must be {n_features} numbers", "box")
-        for least, low, high, most in zip(*box, strict=True):
+        for least, low, high, most in zip(*astuple(self), strict=True):
             if not least <= low <= high <= most:
                 raise MisfitError("the values are not in the order least, low, high, most", "box")
-        return box
+        return DataBox(*astuple(self))
 
 
 class _HeldOutPairs(DocumentPart):

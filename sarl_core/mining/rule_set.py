@@ -17,6 +17,7 @@ from sarl_core.limits import limited_bytes
 from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order, regrown_text
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
+    Wording,
     action_text,
     conditions_text,
     counted,
@@ -24,8 +25,6 @@ from sarl_core.mining.language import (
     formula_texts,
     label_text,
     limits_text,
-    merged_length,
-    sentence,
     share_text,
 )
 from sarl_core.mining.rule_contents import RuleContents
@@ -184,22 +183,19 @@ class RuleSet(RuleContents, Sequence[Rule]):
         """
         import pandas as pd
 
-        features = self.source.features
-        exact = cache(partial(exact_condition, features=features))  # many rules share queries
+        wording, conditions = Wording(self), exact_texts(self)
         return pd.DataFrame(
             {
                 "name": [self.name_of(rule) for rule in self],
                 "id": [rule.id for rule in self],
                 "dimension": [self.actions[rule.dimension].name for rule in self],
                 "action": [label_text(rule.action, self.actions[rule.dimension]) for rule in self],
-                "rule": [sentence(rule, self, evidence=False) for rule in self],
-                "conditions": [
-                    " and ".join(map(exact, rule.conditions)) or "always" for rule in self
-                ],
+                "rule": [wording.sentence(rule, evidence=False) for rule in self],
+                "conditions": list(conditions),
                 **{
                     column: np.array(
                         [
-                            merged_length(rule, features)
+                            wording.merged_length(rule)
                             if column == "merged_length"
                             else getattr(rule, column)
                             for rule in self
@@ -235,11 +231,12 @@ class RuleSet(RuleContents, Sequence[Rule]):
         ]
         if formulas := formula_texts(self):
             lines += ["", "Formulas that they ask about:", *(f"  {one}" for one in formulas)]
+        wording = Wording(self)
         for index, dimension in enumerate(self.actions):
             rules = reading_order(self.of_dimension(index))
             lines += ["", f"{dimension.name}: {counted(len(rules), 'rule')}", ""]
             lines += [
-                f"{self.name_of(rule):>5}. {sentence(rule, self)}{_mark(rule)}" for rule in rules
+                f"{self.name_of(rule):>5}. {wording.sentence(rule)}{_mark(rule)}" for rule in rules
             ]
         if any(rule.placed for rule in self.rules):
             lines += ["", "Rules written by hand or pinned come before the others, in their order."]
@@ -329,6 +326,19 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
         InputError: If it is no rule file, or holds anything this version does not know.
     """
     return RuleSet(**vars(read_rules(text, name)))
+
+
+def exact_texts(rule_set: RuleContents) -> Iterator[str]:
+    """The conditions of rules with their thresholds at full precision.
+
+    Args:
+        rule_set: Any number of rules.
+
+    Yields:
+        Of each rule the queries in path order, joined by "and"; "always" where there is none.
+    """
+    exact = cache(partial(exact_condition, features=rule_set.source.features))
+    return (" and ".join(map(exact, rule.conditions)) or "always" for rule in rule_set.rules)
 
 
 def rules_to_json(rule_set: RuleSet) -> str:

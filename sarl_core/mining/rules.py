@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from numbers import Integral, Real
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from sarl_core.errors import InputError, require
 from sarl_core.mining.evidence import DataBox, HeldOut
 
 Operator = Literal["<=", ">"]
+T = TypeVar("T")
 
 FIRST_REGROWN, LAST_REGROWN = 10**15, 9 * 10**15 - 1
 """Numbers of nodes that were regrown: no tree has as many nodes, and floats hold them exactly."""
@@ -147,6 +148,56 @@ class Rule:
                 values <= np.float64(threshold) if op == "<=" else values > np.float64(threshold)
             )
         return holds
+
+
+def along_paths(rules: Iterable[Rule], start: T, step: Callable[[T, Condition], T]) -> Iterator[T]:
+    """What is worked out along the path to each rule, once for the beginnings that they share.
+
+    Args:
+        rules: In the order of their tree most of a path is that of the rule before; in any other
+            order it takes longer and comes to the same.
+        start: Where nothing was asked yet.
+        step: What comes of that which stands before a condition; it leaves that as it is.
+
+    Yields:
+        What stands at the end of each rule's path.
+    """
+    path: tuple[Condition, ...] = ()
+    values = [start]
+    for rule in rules:
+        shared = 0
+        for before, condition in zip(path, rule.conditions):  # noqa: B905, as far as both go
+            if before is not condition and before != condition:
+                break
+            shared += 1
+        del values[shared + 1 :]
+        path = rule.conditions
+        for condition in path[shared:]:
+            values.append(step(values[-1], condition))
+        yield values[-1]
+
+
+def share_bounds(rules: Iterable[Rule]) -> None:
+    """Work out the `bounds` of many rules, which are then there when they are asked for.
+
+    Args:
+        rules: Those of them that have theirs already are left alone.
+    """
+    lacking = [rule for rule in rules if "bounds" not in vars(rule)]
+    start: dict[int, Bounds] = {}
+    for rule, by_feature in zip(lacking, along_paths(lacking, start, _narrowed), strict=True):
+        vars(rule)["bounds"] = tuple(by_feature.values())
+
+
+def _narrowed(by_feature: dict[int, Bounds], condition: Condition) -> dict[int, Bounds]:
+    """What is asked of each feature, in the order of its first query, with one query more."""
+    feature, op, threshold = condition
+    _, low, high = by_feature.get(feature, (feature, -np.inf, np.inf))
+    if op == "<=":
+        high = min(high, threshold)
+    else:
+        low = max(low, threshold)
+    return {**by_feature, feature: Bounds(feature, low, high)}
 
 
 def take_back_unanswered(

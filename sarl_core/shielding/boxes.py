@@ -6,8 +6,7 @@ does out there is an extrapolation; here it is told from the rest.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +23,7 @@ class Boxes:
     """The data boxes of a rule set; a rule without one reaches everywhere.
 
     Attributes:
-        sides: Of each rule, None where it has no box.
+        sides: Of each rule, by its index; None where it has no box.
     """
 
     def __init__(self, rules: Sequence[Rule], n_features: int) -> None:
@@ -34,17 +33,19 @@ class Boxes:
             rules: R rules.
             n_features: Length d of a state.
         """
-        self.sides: list[Sides | None] = [
-            None if box is None else (tuple(map(_side, box.least)), tuple(map(_side, box.most)))
-            for box in (rule.box for rule in rules)
-        ]
         self._known = np.array([rule.box is not None for rule in rules], dtype=np.bool_)
-        shape = (-1, n_features)
         # One row a rule that has a box, so that a set without boxes takes no room.
         self._row = np.cumsum(self._known) - 1
-        sides = [one for one in self.sides if one is not None]
-        self._least = np.array([least for least, _ in sides], dtype=np.float64).reshape(shape)
-        self._most = np.array([most for _, most in sides], dtype=np.float64).reshape(shape)
+        boxes = [rule.box for rule in rules if rule.box is not None]
+        self._least = _side([box.least for box in boxes], n_features)
+        self._most = _side([box.most for box in boxes], n_features)
+        self.sides: Mapping[int, Sides | None] = _SidesByRule(self._at)
+
+    def _at(self, rule: int) -> Sides | None:
+        if not self._known[rule]:
+            return None
+        row = self._row[rule]
+        return tuple(self._least[row].tolist()), tuple(self._most[row].tolist())
 
     @property
     def count(self) -> int:
@@ -77,9 +78,28 @@ class Boxes:
         return outside
 
 
-def _side(value: float) -> float:
-    """A side of a box; the largest float32 number stands for what is infinite, of a formula."""
-    return math.copysign(math.inf, value) if abs(value) >= _LARGEST else value
+class _SidesByRule(dict[int, Sides | None]):
+    """Plain numbers of the boxes that single states are held against, made when one is.
+
+    Args:
+        make: The sides of a rule's box.
+    """
+
+    def __init__(self, make: Callable[[int], Sides | None]) -> None:
+        super().__init__()
+        self._make = make
+
+    def __missing__(self, rule: int) -> Sides | None:
+        sides = self[rule] = self._make(rule)
+        return sides
+
+
+def _side(values: Sequence[tuple[float, ...]], n_features: int) -> NDArray[np.float64]:
+    """One side of b boxes, (b, d); the largest float32 number stands for what is infinite."""
+    side = np.array(values, dtype=np.float64).reshape(-1, n_features)
+    infinite = np.abs(side) >= _LARGEST
+    side[infinite] = np.copysign(np.inf, side[infinite])
+    return side
 
 
 def leaves_out(sides: Sides, state: list[float]) -> bool:

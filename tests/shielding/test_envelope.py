@@ -198,9 +198,11 @@ def cart():
     narrow = tuple(
         replace(
             rule,
-            box=rule.box._replace(
-                least=(*rule.box.least[:2], -0.01, *rule.box.least[3:]),
-                most=(*rule.box.most[:2], 0.01, *rule.box.most[3:]),
+            box=DataBox(
+                (*rule.box.least[:2], -0.01, *rule.box.least[3:]),
+                rule.box.low,
+                rule.box.high,
+                (*rule.box.most[:2], 0.01, *rule.box.most[3:]),
             ),
         )
         for rule in rules.rules

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
-from functools import cache, partial
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,14 +23,12 @@ from sarl_core.files import as_path, whole_file
 from sarl_core.mining.editing.rounding import Rounding, merged_rules, rounded_rules
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
+    Wording,
     counted,
-    exact_condition,
     label_text,
-    merged_length,
-    sentence,
 )
 from sarl_core.mining.rule_order import rules_for
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rule_set import RuleSet, exact_texts
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import OnInvalid, Shield
 
@@ -54,6 +52,8 @@ CSV_COLUMNS = (
     "pinned",
     *(f"held_out_{name}" for name in HeldOut._fields),
 )
+
+_NOT_TRIED = (None,) * len(HeldOut._fields)
 
 
 class Prepared(NamedTuple):
@@ -317,33 +317,40 @@ def rules_to_csv(rule_set: RuleSet) -> str:
         A header and one line a rule; `conditions` holds the queries in path order with their
         thresholds at full precision, `rule` the sentence with rounded numbers.
     """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(CSV_COLUMNS)
-    features = rule_set.source.features
-    exact = cache(partial(exact_condition, features=features))  # many rules share their queries
-    for rule in rule_set.rules:
+    lines = [_csv_line(CSV_COLUMNS)]
+    wording = Wording(rule_set)
+    for rule, conditions in zip(rule_set.rules, exact_texts(rule_set), strict=True):
         dimension = rule_set.actions[rule.dimension]
         held_out = rule.held_out
-        conditions = " and ".join(map(exact, rule.conditions))
-        writer.writerow(
-            (
-                safe_cell(rule.id),
-                safe_cell(dimension.name),
-                safe_cell(label_text(rule.action, dimension)),
-                safe_cell(sentence(rule, rule_set, evidence=False)),
-                safe_cell(conditions or "always"),
-                repr(rule.support),
-                repr(rule.confidence),
-                repr(rule.lift),
-                repr(rule.joint_support),
-                rule.samples,
-                rule.length,
-                merged_length(rule, features),
-                "yes" if rule.enabled else "no",
-                rule.origin,
-                "yes" if rule.pinned else "no",
-                *(held_out or [None] * len(HeldOut._fields)),
-            )
+        cells = (
+            safe_cell(rule.id),
+            safe_cell(dimension.name),
+            safe_cell(label_text(rule.action, dimension)),
+            safe_cell(wording.sentence(rule, evidence=False)),
+            safe_cell(conditions),
+            repr(rule.support),
+            repr(rule.confidence),
+            repr(rule.lift),
+            repr(rule.joint_support),
+            str(rule.samples),
+            str(rule.length),
+            str(wording.merged_length(rule)),
+            "yes" if rule.enabled else "no",
+            rule.origin,
+            "yes" if rule.pinned else "no",
+            *("" if one is None else str(one) for one in held_out or _NOT_TRIED),
         )
-    return text.getvalue()
+        lines.append(_csv_line(cells))
+    return "".join(lines)
+
+
+def _csv_line(cells: Sequence[str]) -> str:
+    """Cells as a line of CSV, as `csv` writes it."""
+    line = ",".join(cells)
+    if any(sign in line for sign in '"\r\n'):
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerow(cells)
+        return text.getvalue()
+    if line.count(",") >= len(cells):  # some stand in a cell, which is kept together
+        line = ",".join(f'"{cell}"' if "," in cell else cell for cell in cells)
+    return f"{line}\n"

@@ -11,12 +11,11 @@ from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.digits import limit_texts
 from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order, regrown_text
 from sarl_core.mining.language import (
-    action_text,
+    BoundsTexts,
+    Wording,
     counted,
     flag_text,
     is_flag,
-    least_conditions,
-    neither_text,
     one_line,
     share_text,
 )
@@ -64,6 +63,8 @@ def rules_to_markdown(rule_set: RuleSet, sign_off: SignOff | None = None) -> str
     held_out = any(rule.held_out is not None for rule in rule_set.rules)
     headings = ["Rule", "If", "Then", "The expert did so in", "States"]
     headings += ["Held out"] if held_out else []
+    features, wording = source.features, Wording(rule_set)
+    intervals = BoundsTexts(lambda one: _interval(one, features[one.feature]))
     for index, dimension in enumerate(rule_set.actions):
         rules = reading_order(rule_set.of_dimension(index))
         lines += [
@@ -73,7 +74,16 @@ def rules_to_markdown(rule_set: RuleSet, sign_off: SignOff | None = None) -> str
             f"| {' | '.join(headings)} |",
             "|" + " --- |" * len(headings),
         ]
-        lines += [f"| {' | '.join(_cells(rule, rule_set, held_out=held_out))} |" for rule in rules]
+        for rule in rules:
+            conditions = " and ".join(wording.texts(rule, intervals, _text)) or "always"
+            action = _text(wording.action(rule))
+            cells = [
+                _name(rule, rule_set),
+                conditions,
+                action,
+                *_evidence(rule, held_out=held_out),
+            ]
+            lines.append(f"| {' | '.join(cells)} |")
     if any(rule.placed for rule in rule_set.rules):
         lines += ["", "Rules written by hand or pinned come before the others, in their order."]
     return "\n".join(lines) + "\n"
@@ -83,14 +93,8 @@ def _text(text: str) -> str:
     return markdown_text(one_line(text))
 
 
-def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
-    features = rule_set.source.features
-    intervals: list[str] = []
-    for entry in least_conditions(rule, features):
-        neither = neither_text(entry, features)
-        each = (_interval(one, features[one.feature]) for one in entry)
-        intervals += each if neither is None else [_text(neither)]
-    action = _text(action_text(rule.action, rule_set.actions[rule.dimension]))
+def _name(rule: Rule, rule_set: RuleSet) -> str:
+    """What a rule is called, and what a person made of it."""
     name = rule_set.name_of(rule)
     if rule.origin == "manual":
         name += ", by hand"
@@ -98,10 +102,12 @@ def _cells(rule: Rule, rule_set: RuleSet, *, held_out: bool) -> list[str]:
         name += ", pinned"
     if rule.regrown:
         name += ", regrown"
+    return f"{name}{'' if rule.enabled else ', off'}"
+
+
+def _evidence(rule: Rule, *, held_out: bool) -> list[str]:
+    """The counts of a rule."""
     cells = [
-        f"{name}{'' if rule.enabled else ', off'}",
-        " and ".join(intervals) or "always",
-        action,
         share_text(rule.confidence) if rule.samples else "–",
         f"{rule.samples:,}",
     ]

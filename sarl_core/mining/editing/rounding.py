@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -20,11 +21,13 @@ from sarl_core.decimals import short_decimal
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.rules import Condition, Rule
+from sarl_core.mining.rules import Bounds, Condition, Operator, Rule, share_bounds
 
 ONE_SIDED = "no demonstrated state tells its two sides apart"
 SHORTEST = "no shorter number decides every state as it does"
 EMPTIED = "shorter, its rule would apply to no number at all"
+_LARGEST = float(np.finfo(np.float32).max)
+_OPERATORS: tuple[Operator, Operator] = ("<=", ">")
 
 
 class UnroundedThreshold(NamedTuple):
@@ -91,15 +94,12 @@ def rounded_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Rounding
     """
     rule_set = rules_for(rule_set, demonstrations).rule_set
     columns = np.ascontiguousarray(demonstrations.observations.T)
-    able = [_can_apply(rule) for rule in rule_set.rules]
+    able = _can_apply(rule_set.rules)
     whole: frozenset[int] = frozenset()
     while True:
         rounding = _rounding(rule_set, columns, whole)
-        emptied = {
-            place
-            for place, rule in enumerate(rounding.rule_set.rules)
-            if able[place] and not _can_apply(rule)
-        }
+        still = _can_apply(rounding.rule_set.rules)
+        emptied = {place for place, can in enumerate(able) if can and not still[place]}
         if not emptied:
             return rounding
         whole |= emptied
@@ -119,8 +119,11 @@ def _rounding(rule_set: RuleSet, columns: NDArray[np.float32], whole: frozenset[
                 threshold, why = _shortened(columns[query.feature][rows], query.threshold)
                 if threshold != query.threshold and not whole.isdisjoint(query.places):
                     threshold, why = query.threshold, EMPTIED
+                # One of each for all who ask it: what they share is then seen to be the same.
+                below, above = (Condition(query.feature, op, threshold) for op in _OPERATORS)
                 for place in query.places:
-                    paths[place][depth] = paths[place][depth]._replace(threshold=threshold)
+                    path = paths[place]
+                    path[depth] = below if path[depth].op == "<=" else above
                 if why:
                     ids = tuple(rule_set.rules[place].id for place in query.places)
                     unrounded.append(
@@ -135,16 +138,18 @@ def _rounding(rule_set: RuleSet, columns: NDArray[np.float32], whole: frozenset[
     return Rounding(replace(rule_set, rules=rules), rounded, tuple(unrounded))
 
 
-def _can_apply(rule: Rule) -> bool:
-    """Whether there is a float32 for each of its bounds; states are float32, thresholds not."""
-    largest = float(np.finfo(np.float32).max)
-    for _, low, high in rule.bounds:
-        top = np.float32(min(max(high, -largest), largest))
-        if float(top) > high:
-            top = np.nextafter(top, np.float32(-np.inf))
-        if not low < float(top) <= high:
-            return False
-    return True
+def _can_apply(rules: Sequence[Rule]) -> list[bool]:
+    """Whether there is a float32 for each of a rule's bounds; states are, thresholds are not."""
+    share_bounds(rules)
+    has_number = cache(_has_number)  # many rules ask for the same
+    return [all(map(has_number, rule.bounds)) for rule in rules]
+
+
+def _has_number(bounds: Bounds) -> bool:
+    top = np.float32(min(max(bounds.high, -_LARGEST), _LARGEST))
+    if float(top) > bounds.high:
+        top = np.nextafter(top, np.float32(-np.inf))
+    return bool(bounds.low < float(top) <= bounds.high)
 
 
 def merged_rules(rule_set: RuleSet) -> RuleSet:
@@ -157,6 +162,7 @@ def merged_rules(rule_set: RuleSet) -> RuleSet:
         The rules with at most two conditions a feature, in the order of `Rule.bounds`. They apply
         where they did, but are no longer the paths of one tree.
     """
+    share_bounds(rule_set.rules)
     return replace(rule_set, rules=tuple(map(_merged, rule_set.rules)))
 
 
