@@ -23,6 +23,7 @@ from streamlit.runtime.scriptrunner import get_script_run_ctx
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.formulas import Formula
+from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.memory_cache import BoundedCache
@@ -45,6 +46,7 @@ HashFuncs = Mapping[type, Callable[[Any], object]]
 HASH_FUNCS: HashFuncs = {
     Demonstrations: attrgetter("digest"),
     PolicyTree: attrgetter("digest"),
+    DataBox: tuple,
     RuleSet: attrgetter("digest"),
     bytes: digest_of,
     # What a text is read as may be nested deeper than Python likes to look.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import partial
 
 import streamlit as st
@@ -25,6 +26,8 @@ from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.export.settings import ExportSettings
 
 LINES = 150
+MOST_SIGNS = 60_000  # of those lines; a browser takes seconds to colour many more
+LONGEST = MOST_SIGNS // LINES  # of a line, where together they have more
 
 
 @cached(show_spinner="Rounding, and counting what changes …")
@@ -47,12 +50,54 @@ def prepared_for(
     return prepare(rule_set, merged=merged, demonstrations=demonstrations)
 
 
+@dataclass(frozen=True, eq=False)
+class ExportedFile:
+    """A file to carry away. What takes hundreds of megabytes is held packed.
+
+    Attributes:
+        size: Bytes of it.
+        lines: How many it has, and the first of them; none where it is no text.
+        beginning: At most `LINES` of them; where they are long, each as far as `LONGEST`.
+        cut: Whether one of them goes on.
+        packed: Its content, as `zstd` packs it.
+    """
+
+    size: int
+    lines: int
+    beginning: str
+    cut: bool
+    packed: bytes
+
+    @classmethod
+    def of(cls, content: bytes, *, text: bool) -> ExportedFile:
+        """Take a file's content."""
+        import pyarrow as pa
+
+        end = 0
+        for _ in range(LINES if text else 0):
+            end = content.find(b"\n", end) + 1 or len(content)
+        count = content.count(b"\n") + (not content.endswith(b"\n")) if text else 0
+        lines = content[:end].decode().rstrip("\n").split("\n")
+        short = lines
+        if sum(map(len, lines)) > MOST_SIGNS:
+            short = [line if len(line) <= LONGEST else f"{line[:LONGEST]} …" for line in lines]
+        packed = pa.compress(content, codec="zstd", asbytes=True)
+        return cls(len(content), count, "\n".join(short), short != lines, packed)
+
+    def content(self) -> bytes:
+        """All of it."""
+        import pyarrow as pa
+
+        return bytes(pa.decompress(self.packed, self.size, codec="zstd", asbytes=True))
+
+
 @cached(show_spinner="Writing …", hash_funcs={SignOff: sign_off_text})
-def content_of(
+def file_of(
     rule_set: RuleSet, suffix: str, projection: Projection, sign_off: SignOff | None
-) -> bytes:
+) -> ExportedFile:
     """The file."""
-    return export_content(rule_set, suffix, projection, sign_off=sign_off)
+    content = export_content(rule_set, suffix, projection, sign_off=sign_off)
+    return ExportedFile.of(content, text=suffix != ".onnx")
 
 
 @cached()
@@ -71,13 +116,15 @@ def show_file(rule_set: RuleSet, settings: ExportSettings) -> None:
     form, projection = settings.form, settings.projection
     sign_off = sign_off_here(rule_set)
     try:
-        content = content_of(rule_set, form.suffix, projection, sign_off)
+        file = file_of(rule_set, form.suffix, projection, sign_off)
     except SarlError as error:
         refuse(error)
         return
     name = f"{settings.stem}{form.suffix}"
     with st.container(horizontal=True, vertical_alignment="center"):
-        download(f"Download {form.suffix}", content, name, key="carry_download", look="primary")
+        download(
+            f"Download {form.suffix}", file.content, name, key="carry_download", look="primary"
+        )
         download(
             "Test vectors",
             partial(vectors_of, rule_set, projection),
@@ -87,7 +134,7 @@ def show_file(rule_set: RuleSet, settings: ExportSettings) -> None:
             meaning="States at every threshold and one step either side, with the rule and the "
             "action that must come out",
         )
-        st.caption(f"{form.meaning} {len(content) / 1024:,.1f} kB.")
+        st.caption(f"{form.meaning} {file.size / 1024:,.1f} kB.")
     if sign_off is not None:
         st.caption(escaped(sign_off_text(sign_off)))
         before = sign_off_here(settings.rule_set)
@@ -108,7 +155,9 @@ def show_file(rule_set: RuleSet, settings: ExportSettings) -> None:
             "or the action is none that the rules can be asked about."
         )
         return
-    lines = content.decode().splitlines()
-    st.code("\n".join(lines[:LINES]), language=form.language, height=460, line_numbers=True)
-    if len(lines) > LINES:
-        st.caption(f"The first {LINES} of {len(lines):,} lines.")
+    st.code(file.beginning, language=form.language, height=460, line_numbers=True)
+    if file.lines > LINES:
+        more = f", each as far as {LONGEST:,} signs" if file.cut else ""
+        st.caption(f"The first {LINES} of {file.lines:,} lines{more}.")
+    elif file.cut:
+        st.caption(f"Each line as far as {LONGEST:,} signs.")

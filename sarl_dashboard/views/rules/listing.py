@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from sarl_core.explaining.exports.export import rules_to_csv
 from sarl_core.explaining.words.evidence import remedy_text, shortfall_text
-from sarl_core.mining.language import action_text, conditions_text
+from sarl_core.mining.language import action_text
 from sarl_core.mining.rule_set import RuleSet, rules_to_json
 from sarl_core.mining.validation.holding_out import lower_bound, shortfall, with_lower_bound
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.journey.words import with_words
+from sarl_dashboard.components.lists.rule_search import have_word, names_have_word
 from sarl_dashboard.components.settings import search_box
 from sarl_dashboard.components.tables import frame
 from sarl_dashboard.state.data import data_parts, held_out_demonstrations
@@ -79,25 +80,6 @@ def listed_rules(rule_set: RuleSet) -> Listed:
     )
 
 
-@cached(show_spinner="Writing the rules in plain language …")
-def searched_texts(rule_set: RuleSet) -> pa.Array:
-    """What a search looks through, a text a rule in small letters.
-
-    Of very many rules it takes seconds, so it is made when somebody searches.
-    """
-    import pyarrow as pa
-
-    return pa.array(
-        (
-            f"{conditions_text(rule, rule_set)} "
-            f"{action_text(rule.action, rule_set.actions[rule.dimension])} "
-            f"{rule_set.name_of(rule)}".lower()
-            for rule in rule_set.rules
-        ),
-        pa.large_string(),  # together they may be longer than offsets of 32 bits reach
-    )
-
-
 @cached()
 def table_of(rule_set: RuleSet, places: bytes) -> pa.Table:
     """Some rules as an Arrow table, which takes no time to send.
@@ -147,12 +129,9 @@ def matching(listed: Listed, in_force: InForce) -> Places:
 
 def have_words(rule_set: RuleSet, words: tuple[str, ...]) -> NDArray[np.bool_]:
     """Whether each rule has all words of a search, (R,)."""
-    import pyarrow.compute as pc
-
-    texts = searched_texts(rule_set)
     have = np.ones(len(rule_set), dtype=np.bool_)
     for word in words:
-        have &= np.asarray(pc.match_substring(texts, word))
+        have &= have_word(rule_set, word) | names_have_word(len(rule_set), word)
     return have
 
 
