@@ -27,10 +27,11 @@ from sarl_core.mining.rules import Rule
 from sarl_core.shielding.neighbourhood import DecisionChange, FeatureLine, decision_changes
 from sarl_dashboard.components.tree_picture import PathInTree, show_tree
 from sarl_dashboard.views.what_if.derived import derived_values
+from sarl_dashboard.views.what_if.features import sliders
 from sarl_dashboard.views.what_if.proposal import proposal
 from sarl_dashboard.views.what_if.rules import RulesOnTrees
 from sarl_dashboard.views.what_if.situation import Situation
-from sarl_dashboard.views.what_if.state import sliders, source_choice
+from sarl_dashboard.views.what_if.state import source_choice
 
 MISSES, PAIRS = 8, 4  # near misses that lack one feature, and two
 
@@ -43,11 +44,13 @@ class Question:
         situation: The rules, and where states lie.
         state: Shape (d,).
         action: What the agent wants.
+        drawn: The features that are looked at.
     """
 
     situation: Situation
     state: NDArray[np.float32]
     action: Any
+    drawn: tuple[int, ...]
 
 
 @st.fragment
@@ -58,9 +61,9 @@ def question_and_answer(situation: Situation) -> None:
     with left:
         action = proposal(situation.rules.rule_set.actions)
         st.markdown("**The state**")
-        state = sliders(situation)
+        state, drawn = sliders(situation)
         derived_values(situation, state, action)
-    answer(Question(situation, state, action), right)
+    answer(Question(situation, state, action, drawn), right)
 
 
 def answer(question: Question, beside: DeltaGenerator) -> None:
@@ -72,7 +75,7 @@ def answer(question: Question, beside: DeltaGenerator) -> None:
     """
     situation, state, action = question.situation, question.state, question.action
     neighbourhood, spans, spreads = situation.neighbourhood, situation.spans, situation.spreads
-    rules, order = situation.rules, situation.order
+    rules, order = situation.rules, question.drawn
     rule_set = neighbourhood.shield.rule_set
     decision = neighbourhood.shield.decide(state, action)
     lines = neighbourhood.lines(state, action)

@@ -1,4 +1,4 @@
-"""The state on the page What if: where it is taken from, and a slider for each feature of it."""
+"""The state on the page What if: where it is taken from, and how a feature of it is chosen."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.words import Coded, indicated, spelled, words_of
-from sarl_core.mining.language import counted
 from sarl_core.shielding.sampling import Span, random_state, within
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.jobs.replays import latest
@@ -22,8 +21,9 @@ DEMONSTRATED = "a demonstrated state"
 REPLAY = "a step of the replay"
 COVERED = "a random covered state"
 UNCOVERED = "a random uncovered state"
+FIRST_ONES = "_what_if_first"
+"""Of many features those whose sliders come first, as long as no other state is taken."""
 SOURCES = (MEDIAN, DEMONSTRATED, REPLAY, COVERED, UNCOVERED)
-FIRST = 8  # features whose sliders are not folded away
 
 
 # --- where it is taken from --------------------------------------------------------------------
@@ -108,7 +108,7 @@ def _state(situation: Situation, source: str, number: int) -> NDArray[np.float32
     """A state of a source, shape (d,); or a sentence, where it has none."""
     observations = situation.demonstrations.raw_observations
     if source == MEDIAN:
-        return _middle(situation.spans)
+        return middle_state(situation.spans)
     if source in (COVERED, UNCOVERED):
         shield = situation.neighbourhood.shield
         state = random_state(shield, observations, covered=source == COVERED, seed=number)
@@ -147,7 +147,7 @@ def fit_sliders(situation: Situation) -> None:
     spans, columns = situation.spans, situation.columns
     data = repr((spans, columns))
     if st.session_state.get("_what_if_data", data) != data:
-        _put(_middle(spans), situation)
+        _put(middle_state(spans), situation)
     st.session_state["_what_if_data"] = data
     of_words = {at for places in columns.values() for at in places}
     for index, span in enumerate(spans):
@@ -156,22 +156,7 @@ def fit_sliders(situation: Situation) -> None:
             st.session_state[f"x{index}"] = span.middle
 
 
-def sliders(situation: Situation) -> NDArray[np.float32]:
-    """The state, shape (d,): a slider for each number of it, a choice for each word."""
-    first = {at: places[0] for places in situation.columns.values() for at in places}
-    order = tuple(dict.fromkeys(first.get(index, index) for index in situation.order))
-    state = np.zeros(len(situation.spans), dtype=np.float32)
-    for index in order[:FIRST]:
-        _set(state, situation, index)
-    rest = order[FIRST:]
-    if rest:
-        with st.expander(counted(len(rest), "more feature"), icon=":material/unfold_more:"):
-            for index in rest:
-                _set(state, situation, index)
-    return state
-
-
-def _set(state: NDArray[np.float32], situation: Situation, index: int) -> None:
+def draw(state: NDArray[np.float32], situation: Situation, index: int) -> None:
     """Ask for one feature of the state, or for the word of a column that several are about."""
     feature = situation.demonstrations.features[index]
     if feature.indicator is None:
@@ -190,13 +175,15 @@ def _set(state: NDArray[np.float32], situation: Situation, index: int) -> None:
     state[places] = indicated(Coded(np.array([words.index(word)]), words), indicators)[0]
 
 
-def _middle(spans: Sequence[Span]) -> NDArray[np.float32]:
+def middle_state(spans: Sequence[Span]) -> NDArray[np.float32]:
+    """The state in which every feature is in the middle, shape (d,)."""
     return np.array([span.middle for span in spans], dtype=np.float32)
 
 
 def _put(state: NDArray[np.float32], situation: Situation) -> None:
     """Move the sliders; for callbacks, and before they are drawn."""
     near = within(state, situation.spans)
+    st.session_state.pop(FIRST_ONES, None)
     for index, value in enumerate(near.tolist()):
         st.session_state[f"x{index}"] = value
     for places in situation.columns.values():
