@@ -102,7 +102,8 @@ if absurd := absurd_parameters():
     st.switch_page(page, query_params=without(absurd))
 st.html(style_sheet())
 show_logo()
-show_left_out(page.title)
+left_out = st.empty()
+show_left_out(page.title, left_out)
 try:
     data_words.take_up()
     in_force.take_up()
@@ -122,5 +123,6 @@ try:
     next_step(page.title)
     library.say()
 finally:  # also where the page ends early: then it has said itself what to do
-    end_run()
+    end_run(page.title)
     settle(page.title, len(sys.modules))
+    show_left_out(page.title, left_out)

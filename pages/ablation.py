@@ -12,6 +12,7 @@ from sarl_core.errors import SarlError
 from sarl_dashboard.components.journey.environment_needed import require_environment
 from sarl_dashboard.components.run_bar import bars_at_work
 from sarl_dashboard.components.settings import known_seeds_notice
+from sarl_dashboard.session import end_page
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.ablation.outcome import PLACE, outcome
 from sarl_dashboard.views.ablation.settings import settings
@@ -27,7 +28,7 @@ try:
 except SarlError as error:
     refuse(error)
     bars_at_work(PLACE)
-    st.stop()
+    end_page()
 if choice.on_demonstrated_seeds:
     known_seeds_notice()
 outcome(choice)

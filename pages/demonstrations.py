@@ -7,6 +7,7 @@ from functools import partial
 import streamlit as st
 
 from sarl_dashboard.components.downloads import as_file, download
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state.data import uncombined_demonstrations
 from sarl_dashboard.state.thresholds import chosen_divider
 from sarl_dashboard.views.demonstrations.actions import show_actions
@@ -32,7 +33,7 @@ if demonstrations is None:
         "set in the sidebar.",
         icon=":material/upload_file:",
     )
-    st.stop()
+    end_page()
 contents = contents_of(demonstrations)
 divider = chosen_divider()
 show_overview(demonstrations, contents)

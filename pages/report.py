@@ -6,6 +6,7 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_dashboard.jobs.report import comparison_of_session
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state.data import chosen_dataset, require_demonstrations
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.report.order import order_of
@@ -24,5 +25,5 @@ try:
     order = order_of(choices, demonstrations)
 except SarlError as error:
     refuse(error)
-    st.stop()
+    end_page()
 report_of(order, chosen_dataset().replace("_", "-"))

@@ -13,6 +13,7 @@ from sarl_dashboard.components.journey.environment_needed import require_environ
 from sarl_dashboard.components.run_bar import bars_at_work
 from sarl_dashboard.components.settings import known_seeds_notice
 from sarl_dashboard.jobs.episodes import COMPARISON
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state.environments import demonstrated, environment_of
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.shield.lines import guards, line, pilots
@@ -32,7 +33,7 @@ try:
 except SarlError as error:
     refuse(error)
     bars_at_work(COMPARISON)
-    st.stop()
+    end_page()
 shields = guards(choices)
 lines = [line(choices, env_id, agent, shield) for agent in agents for shield in shields]
 if not lines:
@@ -41,7 +42,7 @@ if not lines:
         icon=":material/checklist:",
     )
     bars_at_work(COMPARISON)
-    st.stop()
+    end_page()
 if choices.from_demonstrations and demonstrated(env_id, choices.seed, choices.episodes):
     known_seeds_notice()
 comparison_of(lines, choices.episodes)

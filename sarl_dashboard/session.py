@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import gc
+from typing import NoReturn
 
 import streamlit as st
+from streamlit.runtime.scriptrunner import StopException
 
 
 @st.cache_resource(show_spinner=False)
@@ -29,3 +31,15 @@ def settle(page: str, modules: int) -> None:
 def is_dark() -> bool:
     """Whether the visitor's theme is dark."""
     return str(st.context.theme.get("type", "light")) == "dark"
+
+
+# --- its end -----------------------------------------------------------------------------------
+
+
+def end_page() -> NoReturn:
+    """End a page here, as `st.stop` does.
+
+    After that nothing of Streamlit could be used any more, not even to remember something, and
+    what stands at the end of every run would be left out.
+    """
+    raise StopException

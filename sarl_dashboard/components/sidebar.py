@@ -12,6 +12,7 @@ from sarl_core.mining.language import counted, threshold_text
 from sarl_core.mining.rules import FILTERED
 from sarl_dashboard.components.hold_out import parting_lines
 from sarl_dashboard.components.journey.words import with_words
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state import combining, data_words, in_force, rule_base
 from sarl_dashboard.state.data import (
     all_demonstrations,
@@ -58,12 +59,12 @@ def require_data(title: str) -> None:
         st.title(title)
         refuse(problem)
         st.page_link("library.py", label="Go to Library", icon=":material/arrow_forward:")
-        st.stop()
+        end_page()
     if problem := data_words.problem():
         st.title(title)
         refuse(problem)
         _go_on_without(data_words.go_on_without)
-        st.stop()
+        end_page()
 
 
 def require_rules(title: str) -> None:
@@ -76,7 +77,7 @@ def require_rules(title: str) -> None:
         st.title(title)
         refuse(problem)
         _go_on_without(in_force.go_on_without)
-        st.stop()
+        end_page()
     if in_force.kind() != CHOSEN:  # on a narrow screen, whose sidebar is folded
         with st.container(key="rules_in_force"):
             st.caption(f"Rules: {escaped(in_force.title())}")

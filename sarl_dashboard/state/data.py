@@ -13,13 +13,14 @@ from typing import cast
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import SarlError
+from sarl_core.errors import SarlError, quoted
 from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached, visit
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state import combining, formulas, given_names, hold_out, library
 from sarl_dashboard.state.hold_out import Parts
 from sarl_dashboard.state.thresholds import THRESHOLDS
-from sarl_dashboard.state.url import set_url_choice, url_text
+from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import refuse
 
 SHIPPED_SETS = {
@@ -33,7 +34,6 @@ SHIPPED_SETS = {
 UPLOAD = "upload"
 DEFAULT_DATA = "lunar_lander"
 _MOST_LISTED = 20  # of what is kept; the page Library has all
-_LONGEST = 200  # signs of a name in an address
 DATA_FOLDER = DATA / "demonstrations"
 
 
@@ -78,7 +78,7 @@ def chosen_dataset() -> str:
 
     A link may name anything: what is not there is said (`data_problem`) and nothing else shown.
     """
-    return url_text("data", DEFAULT_DATA, lambda text: len(text) <= _LONGEST)
+    return url_name("data", DEFAULT_DATA)
 
 
 def data_problem() -> str:
@@ -88,8 +88,8 @@ def data_problem() -> str:
         return ""
     if not library.is_id(name):
         return (
-            f"there are no demonstrations called {name!r}; check the address, or choose others in "
-            "the sidebar"
+            f"there are no demonstrations called {quoted(name)}; check the address, or choose "
+            "others in the sidebar"
         )
     try:
         if st.session_state.get("_upload_id") != name:
@@ -164,7 +164,7 @@ def raw_demonstrations() -> Demonstrations | None:
         return shipped_demonstrations(name)
     except SarlError as error:
         refuse(error)
-        st.stop()
+        end_page()
 
 
 def _with_notes(raw: Demonstrations) -> Demonstrations:
@@ -248,7 +248,7 @@ def require_demonstrations() -> Demonstrations:
         st.page_link(
             "demonstrations.py", label="Go to Demonstrations", icon=":material/arrow_forward:"
         )
-        st.stop()
+        end_page()
     return demonstrations
 
 

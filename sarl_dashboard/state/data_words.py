@@ -13,14 +13,13 @@ from typing import Any, cast
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import InputError, SarlError
+from sarl_core.errors import InputError, SarlError, quoted
 from sarl_core.library.annotations import formulas_details, is_annotated, names_details
 from sarl_dashboard.state import formulas, given_names, library
 from sarl_dashboard.state.data import UPLOAD, chosen_dataset, data_problem, raw_demonstrations
-from sarl_dashboard.state.url import set_url_choice, url_text
+from sarl_dashboard.state.url import set_url_choice, url_name
 
 UNKEPT = "unkept"
-_LONGEST = 200  # signs of a name in an address
 
 
 def take_up() -> None:
@@ -29,7 +28,7 @@ def take_up() -> None:
     Once a run, before anything is drawn.
     """
     st.session_state.pop("_names_problem", None)
-    named = url_text("wording", "", lambda text: len(text) <= _LONGEST)
+    named = url_name("wording")
     if data_problem():
         return
     raw = raw_demonstrations()
@@ -66,9 +65,9 @@ def _give(raw: Demonstrations, named: str) -> None:
             "were given; give them again on the page Names, or go on without them"
         )
     if not library.is_id(named):
-        raise InputError(f"there are no names called {named!r}; check the address")
-    item = library.standing_item(named)
-    if item.kind != "names" or item.details.get("of") != raw.digest:
+        raise InputError(f"there are no names called {quoted(named)}; check the address")
+    item = library.linked_item(named, "names", "names of data")
+    if item.details.get("of") != raw.digest:
         raise InputError(
             "the names of this address belong to other data than it names; ask whoever sent it "
             "for a new link, or go on without them"

@@ -10,7 +10,7 @@ from typing import cast
 
 import streamlit as st
 
-from sarl_core.errors import InputError, SarlError
+from sarl_core.errors import InputError, SarlError, quoted
 from sarl_core.mining.editing.edits import Edit, History, check_edit
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
@@ -19,11 +19,10 @@ from sarl_dashboard.state.data import data_problem
 from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, EDITED, IN_FORCE, UNEDITED
 from sarl_dashboard.state.thresholds import THRESHOLDS
-from sarl_dashboard.state.url import set_url_choice, url_text
+from sarl_dashboard.state.url import set_url_choice, url_name
 
 UNKEPT = "unkept"
 """In the place of an id: edits of a visit that could not be kept."""
-_LONGEST = 200  # signs of a name in an address
 
 
 def take_up() -> None:
@@ -33,7 +32,7 @@ def take_up() -> None:
     """
     st.session_state.pop("_edits_changed", None)
     st.session_state.pop("_edits_problem", None)
-    named = url_text("edits", "", lambda text: len(text) <= _LONGEST)
+    named = url_name("edits")
     if data_problem():  # it is said on the page, and the address keeps what it names
         rule_base.base_name()
         return
@@ -72,8 +71,8 @@ def _put_in_force(named: str) -> None:
             )
     else:
         if not library.is_id(named):
-            raise InputError(f"there are no edits called {named!r}; check the address")
-        item = library.standing_item(named)
+            raise InputError(f"there are no edits called {quoted(named)}; check the address")
+        item = library.linked_item(named, "edits", "edits")
         base = rule_base.base()
         if item.details.get("base") != key:
             raise InputError(

@@ -14,7 +14,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import ColumnRole
-from sarl_core.errors import InputError, SarlError
+from sarl_core.errors import InputError, SarlError, quoted
 from sarl_core.library import Item, Library
 from sarl_core.library.contents import (
     add_demonstrations,
@@ -231,13 +231,28 @@ def stored_log(identifier: str) -> Item:
     """
     if not is_id(identifier):
         raise InputError(
-            f"there is no log called {identifier!r}; check the address, or upload the log again"
+            f"there is no log called {quoted(identifier)}; check the address, or upload the log "
+            "again"
         )
+    return linked_item(identifier, "log", "a log")
+
+
+def linked_item(identifier: str, kind: Kind, said: str) -> Item:
+    """What a link names.
+
+    Args:
+        identifier: In the address.
+        kind: That it has to be of.
+        said: The same as a sentence says it.
+
+    Raises:
+        SarlError: If there is none, it was removed, or is something else.
+    """
     item = standing_item(identifier)
-    if item.kind != "log":
+    if item.kind != kind:
         raise InputError(
-            f"what the address names as a log, {item.name!r}, is none; check the address, or "
-            "upload the log again"
+            f"what the address names as {said}, {quoted(item.name)}, is something else; check the "
+            "address"
         )
     return item
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import streamlit as st
 
-from sarl_core.errors import InputError, SarlError
+from sarl_core.errors import InputError, SarlError, quoted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.state import library
 from sarl_dashboard.state.data import (
@@ -33,11 +33,10 @@ from sarl_dashboard.state.rule_files import (
     unnamed_compact_rules,
 )
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, THRESHOLDS, chosen_divider
-from sarl_dashboard.state.url import set_url_choice, url_text
+from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import digest_of
 
 _MOST_LISTED = 12  # of what is kept; the page Library has all
-_LONGEST = 200  # signs of a name in an address
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +58,7 @@ class Base:
 
 def base_name() -> str:
     """What is chosen (URL: set): thresholds, a compact set, an id of the library, a file."""
-    return url_text("set", THRESHOLDS, lambda text: len(text) <= _LONGEST)
+    return url_name("set", THRESHOLDS)
 
 
 def choose(name: str = THRESHOLDS) -> None:
@@ -147,7 +146,7 @@ def _fixed_base(name: str) -> Base:
         if name not in compact_sets():
             data = dataset_label(chosen_dataset())
             raise InputError(
-                f"there are no rules called {name!r} for {data}; choose others in the sidebar"
+                f"there are no rules called {quoted(name)} for {data}; choose others in the sidebar"
             )
         return Base(name, f"compact {unnamed_compact_rules(name).digest}", compact_rules(name))
     if name == OWN_FILE:
@@ -162,7 +161,7 @@ def _fixed_base(name: str) -> Base:
         return Base(OWN_FILE, f"file {digest_of(content)}", as_named(rule_set), file_name)
     if not library.is_id(name):
         raise InputError(
-            f"there are no rules called {name!r}; check the address, or choose others in the "
+            f"there are no rules called {quoted(name)}; check the address, or choose others in the "
             "sidebar"
         )
     item = library.standing_item(name)

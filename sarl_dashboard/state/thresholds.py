@@ -9,7 +9,7 @@ import streamlit as st
 
 from sarl_core.mining.growing.growth import LearnerChoice
 from sarl_core.mining.rules import FILTERED, Thresholds
-from sarl_dashboard.state.url import set_url_choice, url_choice
+from sarl_dashboard.state.url import note_unusable, set_url_choice, url_choice
 
 THRESHOLDS = "thresholds"
 """In an address: the rules are those at the thresholds."""
@@ -28,7 +28,9 @@ def _number(name: str, default: float, low: float, high: float) -> float:
         number = float(value)
     except (TypeError, ValueError):
         number = default
+        note_unusable(name, str(value))
     if not (math.isfinite(number) and low <= number <= high):
+        note_unusable(name, str(value))
         number = default
     return number
 

@@ -7,8 +7,11 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import cast
 
 import streamlit as st
+from streamlit.delta_generator import DeltaGenerator
+from streamlit.proto.WidgetStates_pb2 import WidgetState
 from streamlit.runtime.scriptrunner import get_script_run_ctx
 from streamlit.runtime.state import get_session_state
+from streamlit.runtime.state.query_params import parse_url_param
 
 from sarl_dashboard.text import escaped
 
@@ -44,12 +47,24 @@ def url_text(name: str, default: str, valid: Callable[[str], bool]) -> str:
     value = _in_url(name)
     if value is not None and name not in _waiting() and _is_late(name, value):
         value = None  # the browser had not heard of the choice when it asked for this run
+    if value is not None and not valid(value):
+        note_unusable(name, value)
     if value is None or not valid(value):  # a change of page takes the parameters away
         value = str(st.session_state.get(f"_{name}", default))
     if not valid(value):
         value = default
     set_url_choice(name, value, default)
     return value
+
+
+def url_name(name: str, default: str = "") -> str:
+    """The name of a thing, of whatever form: who looks for the thing says that there is none.
+
+    Args:
+        name: URL parameter.
+        default: Taken where the URL says nothing.
+    """
+    return url_text(name, default, lambda text: True)
 
 
 def set_url_choice(name: str, value: str, default: str = "") -> None:
@@ -118,9 +133,75 @@ def bring_along(now: Mapping[str, str | None]) -> None:
         _write({name: one for name, one in beside.items() if one and _in_url(name) is None})
 
 
-def end_run() -> None:
-    """Let what callbacks choose wait for the run that follows."""
+def end_run(page: str) -> None:
+    """Let what callbacks choose wait for the run that follows; see which of the link was nonsense.
+
+    Args:
+        page: Title of the page that has run.
+    """
     st.session_state["_url_waits"] = True
+    unusable = [*st.session_state.get("_unusable", ()), *_refused_by_widgets()]
+    if unusable:
+        before, _ = st.session_state.get("_left_out_of_link", ((), page))
+        say_left_out(tuple(dict.fromkeys([*before, *unusable])), page)
+        st.session_state["_unusable"] = []
+
+
+def note_unusable(name: str, value: str) -> None:
+    """Note that what the link says of a parameter is nothing that it could be.
+
+    Args:
+        name: URL parameter.
+        value: What was said; where it is no more what the link said, nothing is noted.
+    """
+    link = _link()
+    if value and link.get(name, [""])[-1] == value:
+        del link[name]
+        st.session_state["_unusable"].append(name)
+
+
+def _link() -> dict[str, list[str]]:
+    """What the link that opened the page says, as far as nothing has made use of it yet."""
+    return cast("dict[str, list[str]]", st.session_state.setdefault("_link", {}))
+
+
+def _refused_by_widgets() -> list[str]:
+    """Parameters of the link that widgets of this run took for something else.
+
+    Streamlit gives a widget its usual value where the address has none for it, and says nothing.
+    """
+    context, link = get_script_run_ctx(), _link()
+    if context is None or not link:
+        return []
+    drawn = context.shared.widget_ids_this_run.snapshot()
+    states = {one.id: one for one in get_session_state().get_widget_states()}
+    refused = []
+    with get_session_state().query_params() as url:
+        bindings = {name: url.get_binding_for_param(name) for name in link}
+    for name, binding in bindings.items():
+        if binding is None or binding.widget_id not in drawn or binding.widget_id not in states:
+            continue
+        said, state = link.pop(name), states[binding.widget_id]
+        if f"_{name}_unknown" not in st.session_state and not _is_same(said, state):
+            refused.append(name)
+    return refused
+
+
+def _is_same(said: list[str], state: WidgetState) -> bool:
+    """Whether a widget's value is what a link says; where that is nothing, it is."""
+    if not any(said):
+        return True
+    kind = state.WhichOneof("value")
+    if kind is None:
+        return False
+    value = getattr(state, kind)
+    try:
+        meant = parse_url_param(said, kind)
+    except ValueError:
+        return False
+    if isinstance(meant, list):
+        return sorted(map(str, meant)) == sorted(map(str, value.data))
+    return bool(meant == value)
 
 
 def _waiting() -> dict[str, str | None]:
@@ -174,6 +255,11 @@ def begin_run(page: str) -> None:
         st.session_state["_page"] = page
         _waiting().clear()
         st.session_state.pop("_values_left", None)
+        # What was on screen before was usable then.
+        said = (
+            {} if went_back else {name: st.query_params.get_all(name) for name in st.query_params}
+        )
+        st.session_state["_link"], st.session_state["_unusable"] = said, []
 
 
 def absurd_parameters() -> tuple[str, ...]:
@@ -208,16 +294,21 @@ def say_left_out(names: Sequence[str], page: str) -> None:
     st.session_state["_left_out_of_link"] = (tuple(names), page)
 
 
-def show_left_out(page: str) -> None:
-    """Say what was left out of the link that opened a page, as long as one stays on it."""
+def show_left_out(page: str, place: DeltaGenerator) -> None:
+    """Say what was left out of the link that opened a page, as long as one stays on it.
+
+    Args:
+        page: Title of the page that runs.
+        place: Where to say it, at the top of it.
+    """
     names, linked_page = st.session_state.get("_left_out_of_link", ((), page))
     if linked_page != page:
         del st.session_state["_left_out_of_link"]
     elif names:
         listed = ", ".join(escaped(name[:40]) for name in names[:5])
-        st.warning(
-            f"The link gives a number that cannot be used for {listed}, so the usual one was "
-            "taken; check the address, or choose on this page.",
+        place.warning(
+            f"The link gives something that cannot be used for {listed}, so the usual was taken; "
+            "check the address, or choose on this page.",
             icon=":material/link_off:",
         )
 

@@ -118,7 +118,7 @@ def test_what_was_said_of_the_columns_is_kept_with_the_log(tmp_path: Path) -> No
     [
         ("nonsense", "no log called 'nonsense'"),
         ("a" * 26, "has nothing with the id"),
-        ("demonstrations", "is none"),
+        ("demonstrations", "as a log, 'cartpole.parquet', is something else"),
         ("removed", "was removed by Ada"),
         ("missing file", "is missing from the library"),
     ],

@@ -130,7 +130,7 @@ def test_what_an_address_names_and_is_not_here_is_said_and_nothing_takes_its_pla
 def test_edits_are_no_names_and_the_other_way_round() -> None:
     link = address(edited())
     (sentence,) = errors(open_page("rules", data="cartpole", wording=link["edits"]))
-    assert "belong to other data" in sentence
+    assert "as names of data" in sentence
     app = open_page("rules", data="cartpole", set=link["edits"])
     (sentence,) = errors(app)
     assert "holds no rules" in sentence

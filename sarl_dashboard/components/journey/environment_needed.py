@@ -11,6 +11,7 @@ from sarl_core.errors import SarlError
 from sarl_dashboard.components.run_bar import bars_at_work
 from sarl_dashboard.components.settings import environment_choice
 from sarl_dashboard.jobs.job import Place
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state.data import require_demonstrations, uncombined_demonstrations
 from sarl_dashboard.state.environments import AS_DEMONSTRATED, environment_of
 from sarl_dashboard.text import escaped, in_full, refuse
@@ -41,7 +42,7 @@ def require_environment(*places: Place[Any]) -> None:
     with st.container(border=True):
         environment_choice()
     st.page_link("audit.py", label="Go to Audit", icon=":material/arrow_forward:")
-    st.stop()
+    end_page()
 
 
 def require_own_environment() -> None:
@@ -55,7 +56,7 @@ def require_own_environment() -> None:
         "choose other demonstrations in the sidebar",
     )
     st.page_link("demonstrations.py", label="Go to Demonstrations", icon=":material/arrow_forward:")
-    st.stop()
+    end_page()
 
 
 def _problem(choice: str) -> SarlError | None:

@@ -20,13 +20,12 @@ from sarl_dashboard.cache import cached
 from sarl_dashboard.components.column_form import ColumnForm
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import rule_set_choice
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state import library
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_choice import rules_for
-from sarl_dashboard.state.url import set_url_choice, url_text
+from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import escaped, in_full, refuse
-
-_LONGEST = 200  # signs of a name in an address
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +67,7 @@ def chosen_rules() -> ChosenRules:
         rule_set = rules_for(choice)
     except SarlError as error:
         st.info(in_full(str(error)), icon=":material/upload_file:")
-        st.stop()
+        end_page()
     assert rule_set is not None
     if not rule_set.rules:
         st.info(
@@ -76,7 +75,7 @@ def chosen_rules() -> ChosenRules:
             "page, or choose other rules.",
             icon=":material/filter_alt_off:",
         )
-        st.stop()
+        end_page()
     return ChosenRules(choice, rule_set)
 
 
@@ -109,13 +108,13 @@ def chosen_logs(rules: ChosenRules) -> Logs:
                 args=(key,),
             )
     if isinstance(log, str) or isinstance(after, str):
-        st.stop()
+        end_page()
     if log is None:
         st.info(
             "Upload a log to hold these rules against it.",
             icon=":material/upload_file:",
         )
-        st.stop()
+        end_page()
     held = _answer(rules, log, log.roles)
     other = None
     if after is not None:
@@ -123,7 +122,7 @@ def chosen_logs(rules: ChosenRules) -> Logs:
         said = log.roles if after.columns == log.columns else ()
         other = _answer(rules, after, after.roles or said)
     if held is None or (after is not None and other is None):
-        st.stop()
+        end_page()
     comparison = None if other is None else LogComparison(held, other)
     identifiers = tuple(
         one.identifier for one in (log, after) if one is not None and one.identifier
@@ -187,7 +186,7 @@ class _Log:
 
 def _chosen(key: str, label: str, hint: str) -> _Log | str | None:
     """The uploader of a log; the log, why what the address names is none, or nothing."""
-    named = url_text(key, "", lambda text: len(text) <= _LONGEST)
+    named = url_name(key)
     uploaded = st.file_uploader(
         label, key=f"{key}_file", on_change=_take, args=(key,), help=with_words(hint)
     )

@@ -17,11 +17,10 @@ from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_choice import BETWEEN, rules_for
 from sarl_dashboard.state.rule_files import EDITED, IN_FORCE, UNEDITED
 from sarl_dashboard.state.thresholds import chosen_thresholds
-from sarl_dashboard.state.url import set_url_choice, url_text
+from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import in_full
 
 MOST = 5
-_LONGEST = 500  # signs of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +82,7 @@ def _named() -> list[str]:
     before = [st.query_params.get(name, "") for name in ("first", "second")]
     if all(before) and "sets" not in st.query_params:  # an address of when there were two
         usual = (before[0], before[1])
-    text = url_text("sets", "", lambda text: len(text) <= _LONGEST) or BETWEEN.join(usual)
+    text = url_name("sets") or BETWEEN.join(usual)
     return list(dict.fromkeys(filter(None, text.split(BETWEEN))))[:MOST]
 
 

@@ -16,7 +16,7 @@ from sarl_core.library import Item, Library
 from sarl_core.library.bundles import ENDING, import_bundle
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.tables import table_height
-from sarl_dashboard.state.url import set_url_choice, url_text
+from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import refuse
 
 KINDS = {
@@ -26,7 +26,6 @@ KINDS = {
     "note": "Note",
     "log": "Log",
 }
-_LONGEST = 200  # signs of a name in an address
 _FORMS = {
     ".csv": "a table",
     ".gif": "a film",
@@ -39,7 +38,7 @@ _FORMS = {
 
 def choose_item(opened: Library, author: str) -> Item | None:
     """The list; the thing that is chosen in it or that a link names, None where none is."""
-    named = url_text("item", "", lambda text: len(text) <= _LONGEST)
+    named = url_name("item")
     item = None
     if named:
         try:

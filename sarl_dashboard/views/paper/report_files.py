@@ -17,6 +17,7 @@ from sarl_core.paper.study import FULL_MINUTES, Drawing
 from sarl_core.paper.tables import read_table
 from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached
+from sarl_dashboard.session import end_page
 from sarl_dashboard.text import refuse
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def require_report() -> PaperReport:
         refuse(error)
         st.caption("This makes it again:")
         st.code(COMMAND, language="sh")
-        st.stop()
+        end_page()
     if reproduced is None or not reproduced.studies:
         st.info(
             "Nothing has been reproduced yet. This command, where the dashboard runs, makes every "
@@ -64,7 +65,7 @@ def require_report() -> PaperReport:
             icon=":material/terminal:",
         )
         st.code(COMMAND, language="sh")
-        st.stop()
+        end_page()
     return reproduced
 
 

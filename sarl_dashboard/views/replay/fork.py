@@ -17,7 +17,6 @@ from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import digest_of, escaped
 from sarl_dashboard.views.replay.player import film_player
 
-_LONGEST = 40  # signs of a fork in an address
 RESTS: dict[str, Rest] = {"only this change": "shielded", "the shield from here on": "alone"}
 
 
@@ -29,6 +28,9 @@ def fork_section(played: Played, current: int) -> None:
         current: The step that is chosen.
     """
     steps, order = played.replay.steps, played.order
+    changed = steps.intervened.nonzero()[0].tolist()
+    possible = {f"{step}:{rest}" for step in changed for rest in RESTS.values()} | {""}
+    linked = url_text("fork", "", possible.__contains__)
     st.html(heading("Without this change"))
     if not steps.intervened[current]:
         st.caption(
@@ -60,7 +62,7 @@ def fork_section(played: Played, current: int) -> None:
         return forking(order, current, rest)
 
     if (
-        url_text("fork", "", lambda text: len(text) <= _LONGEST) == name
+        linked == name
         and key not in fork_cache()
         and not FORK.at_work
         and st.session_state.get("_fork_opened") != key
