@@ -89,29 +89,36 @@ def grow_policy_trees(
             f"the support down to which trees are grown is {quoted(min_support)}; give 0 to 1"
         )
     chosen = learner_for(learner, len(demonstrations))
-    dimensions = label_dimensions(demonstrations, divider)
+    labels = [
+        dimension.labels_of(demonstrations.action_columns[:, index])
+        for index, dimension in enumerate(label_dimensions(demonstrations, divider))
+    ]
     least = _least(float(min_support), len(demonstrations))
-    bins = BinnedStates.of(demonstrations.observations) if chosen == "histogram" else None
+    states = demonstrations.observations
+    if chosen == "histogram":
+        bins = BinnedStates.of(states)
+        structures = [
+            histogram_structure(bins, column, least=least, max_depth=max_depth, seed=seed)
+            for column in labels
+        ]
+        del bins  # as large as the states are, and counting needs room, too
+        return tuple(
+            count_tree(structure, demonstrations, index, divider=divider, learner=chosen)
+            for index, structure in enumerate(structures)
+        )
 
     def grown(index: int) -> PolicyTree:
-        labels = dimensions[index].labels_of(demonstrations.action_columns[:, index])
-        if bins is not None:
-            structure = histogram_structure(
-                bins, labels, least=least, max_depth=max_depth, seed=seed
-            )
-            return count_tree(structure, demonstrations, index, divider=divider, learner=chosen)
-        states = demonstrations.observations
-        structure = exact_structure(states, labels, max_depth=max_depth, seed=seed)
+        structure = exact_structure(states, labels[index], max_depth=max_depth, seed=seed)
         tree = count_tree(structure, demonstrations, index, divider=divider)
         return tree if least <= 2 else _cut_back(tree, least, demonstrations)
 
-    if len(dimensions) == 1 or bins is not None:  # the histogram learner has threads of its own
-        return tuple(map(grown, range(len(dimensions))))
+    if len(labels) == 1:
+        return (grown(0),)
     from loky import cpu_count
 
     # scikit-learn lets other threads run while it grows a tree.
-    with ThreadPoolExecutor(min(len(dimensions), cpu_count())) as threads:
-        return tuple(threads.map(grown, range(len(dimensions))))
+    with ThreadPoolExecutor(min(len(labels), cpu_count())) as threads:
+        return tuple(threads.map(grown, range(len(labels))))
 
 
 def part_of_tree(
