@@ -32,6 +32,7 @@ ROWS = {
     "export": "pages.export",
     "evidence": "pages.evidence",
     "rules": "pages.rules",
+    "many-rules": "many_rules.many_rules",
     "names": "pages.names",
     "report": "pages.report",
     "replay": "pages.replay",

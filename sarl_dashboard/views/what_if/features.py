@@ -84,7 +84,7 @@ def _some_sliders(situation: Situation, order: Sequence[int]) -> ChosenState:
         for index in page:
             _draw_as_chosen(state, situation, index, values)
     drawn = (*first, *page)
-    _remember(values, drawn)
+    _remember(situation, values, drawn)
     return ChosenState(state, _with_all_words(situation, drawn))
 
 
@@ -198,8 +198,13 @@ def _draw_as_chosen(
     values[index] = st.session_state[key]
 
 
-def _remember(values: dict[int, Value], drawn: Sequence[int]) -> None:
-    """Keep what was chosen; the address says it of those that have no widget now."""
+def _remember(situation: Situation, values: dict[int, Value], drawn: Sequence[int]) -> None:
+    """Hold on to what was chosen; the address says it of what has no widget and was moved."""
     st.session_state["_what_if_values"] = values
-    others = (f"{at}:{value}" for at, value in sorted(values.items()) if at not in drawn)
+    spans = situation.spans
+    others = (
+        f"{at}:{value}"
+        for at, value in sorted(values.items())
+        if at not in drawn and value != spans[at].middle
+    )
     set_url_choice(FURTHER, "~".join(others))
