@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import pandas as pd
 import streamlit as st
 
+from sarl_core.explaining.html.table import Column, table_html
 from sarl_core.mining.language import share_text
 from sarl_dashboard.state import edits
 from sarl_dashboard.views.difference.sides import Side
@@ -19,26 +20,9 @@ def show_overview(sides: Sequence[Side], different: Callable[[Side, Side], float
         sides: The one that the others are held against first.
         different: Share of the states that two of them decide differently.
     """
-    column = st.column_config
-    share = column.NumberColumn(format="percent", width="small")
-    st.dataframe(
-        pd.DataFrame([_line(side) for side in sides]),
-        hide_index=True,
-        width="content",
-        key="compared_sets",
-        alt="What each rule set comes to",
-        column_config={
-            "Rule set": column.TextColumn(width="medium"),
-            "Rules": column.NumberColumn(
-                format="localized", width="small", help="That are switched on"
-            ),
-            "Mean length": column.NumberColumn(
-                format="%.1f", width=110, help="Of the rules that are switched on"
-            ),
-            "Coverage": share,
-            "Fidelity": share,
-        },
-    )
+    lines = [_line(side) for side in sides]
+    with st.container(width=_WIDTH):
+        st.html(table_html(_COLUMNS, lines, "What each rule set comes to"))
     if len(sides) > 2:
         st.caption("Share of the states that two of them decide differently:")
         st.dataframe(
@@ -50,16 +34,26 @@ def show_overview(sides: Sequence[Side], different: Callable[[Side, Side], float
         )
 
 
-def _line(side: Side) -> dict[str, object]:
+_WIDTH = 560  # pixels, where there are so many
+_COLUMNS = (
+    Column("Rule set"),
+    Column("Rules", "n", "That are switched on"),
+    Column("Mean length", "n", "Of the rules that are switched on"),
+    Column("Coverage", "n"),
+    Column("Fidelity", "n"),
+)
+
+
+def _line(side: Side) -> tuple[str, ...]:
     verdicts = edits.verdicts_of_set(side.rule_set)
     lengths = [rule.length for rule in side.rule_set.rules if rule.enabled]
-    return {
-        "Rule set": side.name,
-        "Rules": len(lengths),
-        "Mean length": sum(lengths) / max(len(lengths), 1),
-        "Coverage": verdicts.coverage,
-        "Fidelity": verdicts.fidelity,
-    }
+    return (
+        side.name,
+        f"{len(lengths):,}",
+        f"{sum(lengths) / max(len(lengths), 1):.1f}",
+        share_text(verdicts.coverage),
+        share_text(verdicts.fidelity),
+    )
 
 
 def _differences(sides: Sequence[Side], different: Callable[[Side, Side], float]) -> pd.DataFrame:
