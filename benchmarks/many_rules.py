@@ -5,6 +5,7 @@ Beside the browser, so that it is the product's own part; what the first time ta
 
 from __future__ import annotations
 
+import logging
 import statistics
 from collections.abc import Callable, Iterable
 
@@ -42,6 +43,7 @@ def many_rules(quick: bool) -> Iterable[Row]:
     from sarl_dashboard.views.export.settings import FORMATS
     from sarl_dashboard.views.rules.listing import listed_rules, table_of
 
+    logging.getLogger("streamlit").setLevel(logging.ERROR)  # it misses a page to say things on
     rule_set = rules()
     count, words = f"{len(rule_set):,} rules", iter(range(FEATURES))
 
