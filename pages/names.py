@@ -9,6 +9,7 @@ import streamlit as st
 from sarl_dashboard.components.downloads import as_file, download
 from sarl_dashboard.state import given_names
 from sarl_dashboard.state.data import all_demonstrations, raw_demonstrations, require_demonstrations
+from sarl_dashboard.state.data_words import say_given
 from sarl_dashboard.text import file_name, in_full
 from sarl_dashboard.views.names.formulas import formula_editor, show_formulas
 from sarl_dashboard.views.names.tables import (
@@ -31,6 +32,7 @@ raw = raw_demonstrations()
 assert raw is not None
 for table in (FEATURES, ACTIONS, LABELS):
     take(table, raw)
+say_given(raw)
 problem = given_names.problem(raw)
 if problem:
     st.error(

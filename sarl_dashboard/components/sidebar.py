@@ -150,6 +150,7 @@ def sidebar(*, with_thresholds: bool = True) -> None:
     # A page without sliders keeps what a link says, for the page that has them.
     choose_thresholds(thresholds)
     choose_divider(divider)
+    st.session_state["_went_back"] = False  # what the address says is chosen by now
     for parameter, value in threshold_parameters().items():
         say_in_url(parameter, value)
     # The widget follows the URL, so a link and the browser's "back" both reach it.

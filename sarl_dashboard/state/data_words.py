@@ -34,12 +34,20 @@ def take_up() -> None:
     raw = raw_demonstrations()
     if raw is None:
         return
-    if named and named != st.session_state.get("_wording_named", ""):
+    if named != st.session_state.get("_wording_named", ""):
         try:
-            _give(raw, named)
+            if named:
+                _give(raw, named)
+            elif _is_in_address(raw):  # the browser went back to where there were none
+                _leave(raw)
         except SarlError as error:
             st.session_state["_names_problem"] = str(error)
             return
+    say_given(raw)
+
+
+def say_given(raw: Demonstrations) -> None:
+    """Say in the address which names are given; after what changes them while a page runs."""
     named = _name_of(raw)
     set_url_choice("wording", named)
     st.session_state["_wording_named"] = named
@@ -56,8 +64,24 @@ def go_on_without() -> None:
     st.session_state["_wording_named"] = ""
 
 
+def _leave(raw: Demonstrations) -> None:
+    """Have the data as they came; what could not be kept can still be gone forward to."""
+    if st.session_state.get("_wording_named") == UNKEPT:
+        _unkept()[raw.digest] = _given(raw)
+    formulas.leave(raw)
+    given_names.leave(raw)
+
+
+def _unkept() -> dict[str, dict[str, Any]]:
+    """What was given in this visit, could not be kept, and was left, by the data."""
+    return cast("dict[str, dict[str, Any]]", st.session_state.setdefault("_wording_unkept", {}))
+
+
 def _give(raw: Demonstrations, named: str) -> None:
     if named == UNKEPT:
+        if left := _unkept().pop(raw.digest, None):
+            formulas.restore(raw, left)
+            given_names.restore(raw, left)
         if _given(raw):
             return
         raise InputError(
@@ -72,6 +96,7 @@ def _give(raw: Demonstrations, named: str) -> None:
             "the names of this address belong to other data than it names; ask whoever sent it "
             "for a new link, or go on without them"
         )
+    _leave(raw)
     try:
         formulas.restore(raw, item.details)
         given_names.restore(raw, item.details)
@@ -85,10 +110,15 @@ def _given(raw: Demonstrations) -> dict[str, Any]:
     return given if is_annotated(given) else {}
 
 
+def _is_in_address(raw: Demonstrations) -> bool:
+    """Whether names of data stand in the address, and not with the data."""
+    return chosen_dataset() != UPLOAD and not library.is_own(raw)
+
+
 def _name_of(raw: Demonstrations) -> str:
     """The id under which they are kept; "" where there are none, or they stand with the data."""
     given = _given(raw)
-    if not given or chosen_dataset() == UPLOAD or library.is_own(raw):
+    if not given or not _is_in_address(raw):
         return ""
     ids = cast("dict[str, str]", st.session_state.setdefault("_names_ids", {}))
     text = json.dumps({"of": raw.digest, **given}, sort_keys=True)

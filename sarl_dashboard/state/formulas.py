@@ -44,6 +44,11 @@ def put(raw: Demonstrations, derived: Derived) -> None:
     library.annotate(raw, formulas_details(changed(raw)))
 
 
+def leave(raw: Demonstrations) -> None:
+    """Let that be derived which the file derives, in this visit; what is kept stays."""
+    _written().pop(raw.digest, None)
+
+
 def changed(raw: Demonstrations) -> Derived | None:
     """All that is derived; None where a visitor has changed nothing of it."""
     return _written().get(raw.digest)

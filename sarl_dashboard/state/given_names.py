@@ -71,10 +71,17 @@ def give(raw: Demonstrations, names: Names) -> None:
         library.annotate(raw, names_details(None if own else put))
 
 
-def reset(raw: Demonstrations) -> None:
-    """Go back to the names that the data came with; for callbacks."""
+def leave(raw: Demonstrations) -> None:
+    """Go back to the names that the data came with in this visit; what is kept stays."""
     _drafts().pop(raw.digest, None)
     _given().pop(raw.digest, None)
+    # The tables on the page Names become others, which know nothing of what was typed.
+    st.session_state["_names_reset"] = st.session_state.get("_names_reset", 0) + 1
+
+
+def reset(raw: Demonstrations) -> None:
+    """Go back to the names that the data came with; for callbacks."""
+    leave(raw)
     library.annotate(raw, names_details(None))
 
 

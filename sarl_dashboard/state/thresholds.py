@@ -21,7 +21,8 @@ MAX_DEPTH = 64  # 0 is no limit
 
 def _number(name: str, default: float, low: float, high: float) -> float:
     """A number that a widget of some page holds; else the URL's; else the default."""
-    value: Any = st.session_state.get(name)
+    went_back = st.session_state.get("_went_back")  # to an address that says everything
+    value: Any = None if went_back else st.session_state.get(name)
     if value is None:
         value = st.query_params.get(name, default)
     try:

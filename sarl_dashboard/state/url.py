@@ -128,9 +128,32 @@ def bring_along(now: Mapping[str, str | None]) -> None:
         now: What is said of it that a part of the last page may have changed since.
     """
     context = get_script_run_ctx()
-    if not (context and context.is_history_navigation):
-        beside = st.session_state.get("_url_beside", {}) | now
-        _write({name: one for name, one in beside.items() if one and _in_url(name) is None})
+    page = context.page_script_hash if context else ""
+    before = st.session_state.get("_page_hash", page)
+    st.session_state["_page_hash"] = page
+    if page == before or (context and context.is_history_navigation):
+        return
+    beside = st.session_state.get("_url_beside", {}) | now
+    _write_in_order({name: one for name, one in beside.items() if one and _in_url(name) is None})
+
+
+def _write_in_order(values: Mapping[str, str]) -> None:
+    """Write into the URL what the browser's address has already, in the order that it has there.
+
+    The same in another order would be another address to go back to.
+    """
+    with get_session_state().query_params() as url:
+        if not values or any(url.is_bound(name) for name in url):
+            _write(values)
+            return
+        there = {name: url.get_all(name) for name in url} | {
+            name: [value] for name, value in values.items()
+        }
+        before = st.session_state.get("_url_order", ())
+        ordered = sorted(there, key=lambda name: (*before, name).index(name))
+        for name in list(url):
+            url.discard_param_no_forward_msg(name)
+        url.update({name: there[name] for name in ordered})
 
 
 def end_run(page: str) -> None:
@@ -145,6 +168,20 @@ def end_run(page: str) -> None:
         before, _ = st.session_state.get("_left_out_of_link", ((), page))
         say_left_out(tuple(dict.fromkeys([*before, *unusable])), page)
         st.session_state["_unusable"] = []
+    stay_beside()
+
+
+def stay_beside() -> None:
+    """Let what stands beside every page stay in the address when the page changes; after widgets.
+
+    What a page's widgets are bound to, Streamlit takes out of the address before anything here
+    runs: the browser would write an address without it, and go back to that.
+    """
+    st.session_state["_url_order"] = list(st.query_params)
+    with get_session_state().query_params() as url:
+        for name in st.session_state.get("_url_said", ()):
+            if binding := url.get_binding_for_param(name):
+                url.unbind_widget(binding.widget_id)
 
 
 def note_unusable(name: str, value: str) -> None:
@@ -250,6 +287,7 @@ def begin_run(page: str) -> None:
         for name in st.session_state.get("_url_names", ()):
             if name not in st.query_params:
                 st.session_state.pop(f"_{name}", None)
+    st.session_state["_went_back"] = went_back
     st.session_state["_url_waits"], st.session_state["_url_said"] = True, set()
     if st.session_state.get("_page") != page or went_back:
         st.session_state["_page"] = page

@@ -165,7 +165,6 @@ def editor(table: str, raw: Demonstrations) -> None:
 def forget(raw: Demonstrations) -> None:
     """Back to the names of the data."""
     given_names.reset(raw)
-    st.session_state["_names_reset"] = st.session_state.get("_names_reset", 0) + 1
 
 
 def show_sentence(demonstrations: Demonstrations) -> None:

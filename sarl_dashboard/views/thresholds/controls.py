@@ -31,6 +31,7 @@ from sarl_dashboard.state.rule_files import (
     compact_sets,
 )
 from sarl_dashboard.state.thresholds import MAX_DIVIDER, MIN_DIVIDER, chosen_thresholds
+from sarl_dashboard.state.url import stay_beside
 from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.largest_rules import show_largest
 from sarl_dashboard.views.thresholds.moves import (
@@ -102,6 +103,7 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
                 help=word_help("divider"),
             )
         named_settings(thresholds, rule_base.compact_name() if display.compact else None)
+    stay_beside()
     point = display.point(thresholds)
     everything = display.dimension is None
     show_numbers(

@@ -1,0 +1,124 @@
+"""One change is one address to go back to, and going back takes the change back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from playwright.sync_api import Page, expect
+
+from tests.browser.walking import no_trace, parameters, settle, visit
+
+DATA = Path(__file__).parents[2] / "data" / "demonstrations"
+
+
+def addresses(screen: Page) -> int:
+    """How many the browser goes through."""
+    return int(screen.evaluate("history.length"))
+
+
+def go(screen: Page, page: str) -> None:
+    """Follow the navigation."""
+    screen.get_by_test_id("stSidebar").get_by_role("link", name=page, exact=True).click()
+    expect(screen.get_by_role("heading", name=page, level=1)).to_be_visible()
+    settle(screen)
+
+
+def test_a_moved_slider_leaves_no_address_without_it(screen: Page) -> None:
+    visit(screen, "/thresholds?data=cartpole", "Thresholds")
+    before = addresses(screen)
+    screen.get_by_role("slider", name="Minimum support").press("ArrowRight")
+    settle(screen)
+    support = parameters(screen)["support"]
+    go(screen, "Rules")
+    assert addresses(screen) == before + 1
+    assert parameters(screen)["support"] == support
+    go(screen, "Thresholds")
+    go(screen, "Audit")
+    for page in ("Thresholds", "Rules", "Thresholds"):
+        screen.go_back()
+        expect(screen.get_by_role("heading", name=page, level=1)).to_be_visible()
+        settle(screen)
+        assert parameters(screen)["support"] == support
+    screen.get_by_role("button", name="Unfiltered", exact=True).click()
+    settle(screen)
+    assert (parameters(screen)["support"], parameters(screen)["confidence"]) == ("0", "1")
+    screen.go_back()
+    settle(screen)
+    assert parameters(screen)["support"] == support
+    assert "confidence" not in parameters(screen)
+    no_trace(screen)
+
+
+def test_thresholds_go_back_on_pages_without_sliders(screen: Page) -> None:
+    visit(screen, "/rules?data=cartpole&support=0.05", "Rules")
+    in_force = screen.get_by_test_id("stSidebar").get_by_text("Support at least")
+    go(screen, "Thresholds")
+    screen.get_by_role("button", name="Unfiltered", exact=True).click()
+    settle(screen)
+    go(screen, "Rules")
+    expect(in_force).to_contain_text("Support at least 0")
+    for _ in range(3):
+        screen.go_back()
+        settle(screen)
+    expect(screen.get_by_role("heading", name="Rules", level=1)).to_be_visible()
+    expect(in_force).to_contain_text("Support at least 0.05")
+    assert parameters(screen)["support"] == "0.05"
+    no_trace(screen)
+
+
+def test_an_upload_is_one_address(screen: Page) -> None:
+    visit(screen, "/demonstrations?data=cartpole&support=0.01", "Demonstrations")
+    before = addresses(screen)
+    screen.locator("input[type=file]").first.set_input_files(DATA / "pendulum.parquet")
+    expect(screen.get_by_test_id("stSidebar").get_by_text("15,000 steps")).to_be_visible()
+    screen.wait_for_function("location.search.length > 40")
+    settle(screen)
+    assert addresses(screen) == before + 1
+    go(screen, "Audit")
+    before = addresses(screen)
+    screen.locator("input[type=file]").first.set_input_files(DATA / "pendulum.parquet")
+    screen.wait_for_function("location.search.includes('log=')")
+    settle(screen)
+    assert addresses(screen) == before + 1
+    no_trace(screen)
+
+
+def typed(screen: Page, text: str) -> None:
+    """Give the last feature a name, as its row takes it."""
+    table = screen.get_by_test_id("stDataFrame").first
+    table.dblclick(position={"x": 120, "y": 150})
+    screen.locator("textarea.gdg-input, .gdg-input").last.fill(text)
+    screen.keyboard.press("Enter")
+    expect(screen.get_by_text(f"If the {text} is")).to_be_visible()
+    settle(screen)
+
+
+def names(screen: Page) -> str:
+    """How a rule reads on the page Names."""
+    return screen.get_by_text("If the ").last.inner_text()
+
+
+def test_going_back_takes_names_back_and_forward_gives_them_again(screen: Page) -> None:
+    visit(screen, "/names?data=cartpole", "Names")
+    before, plain = addresses(screen), names(screen)
+    typed(screen, "place")
+    screen.wait_for_function("location.search.includes('wording=')")
+    settle(screen)
+    assert addresses(screen) == before + 1
+    named = names(screen)
+    assert "place" in named
+    screen.go_back()
+    settle(screen)
+    assert "wording" not in parameters(screen)
+    assert names(screen) == plain
+    screen.go_forward()
+    settle(screen)
+    assert names(screen) == named
+    go(screen, "Rules")
+    assert "place" in screen.locator(".st-key-sentence").first.inner_text()
+    for _ in range(2):
+        screen.go_back()
+        settle(screen)
+    assert "wording" not in parameters(screen)
+    assert names(screen) == plain
+    no_trace(screen)
