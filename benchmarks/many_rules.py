@@ -56,7 +56,7 @@ def many_rules(quick: bool) -> Iterable[Row]:
         have_word(rule_set, f"feature {next(words)}")
 
     def file(suffix: str) -> Callable[[], object]:
-        return lambda: file_of(rule_set, suffix, "centre", None).content()
+        return lambda: file_of(rule_set, suffix, "centre", None).file.content()
 
     kinds: list[tuple[str, Callable[[], object]]] = [("another page", page), ("a search", search)]
     kinds += [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -31,6 +32,40 @@ MIMES = {
 }
 
 
+LARGE = 2**24
+"""Bytes of a file that nobody should wait for twice."""
+# Streamlit's server would pack such a file at each download, which takes ten seconds for 350 MB;
+# this is one of the kinds that it leaves as they are, and to a browser just a file.
+_AS_IT_IS = "application/grpc"
+
+
+@dataclass(frozen=True, eq=False)
+class PackedFile:
+    """A file to carry away, held packed: many rules take hundreds of megabytes.
+
+    Attributes:
+        size: Bytes of it.
+        packed: Its content, as `zstd` packs it.
+    """
+
+    size: int
+    packed: bytes
+
+    @classmethod
+    def of(cls, content: str | bytes) -> PackedFile:
+        """Take a file's content."""
+        import pyarrow as pa
+
+        encoded = content.encode() if isinstance(content, str) else content
+        return cls(len(encoded), pa.compress(encoded, codec="zstd", asbytes=True))
+
+    def content(self) -> bytes:
+        """All of it."""
+        import pyarrow as pa
+
+        return bytes(pa.decompress(self.packed, self.size, codec="zstd", asbytes=True))
+
+
 def download(
     label: str,
     content: str | bytes | Callable[[], str | bytes],
@@ -40,6 +75,7 @@ def download(
     meaning: str | None = None,
     icon: str = "download",
     look: Literal["primary", "secondary"] = "secondary",
+    large: bool = False,
 ) -> None:
     """A button that gives a file, and runs nothing.
 
@@ -51,12 +87,13 @@ def download(
         meaning: What is said beside it.
         icon: Name of a Material symbol.
         look: Primary for the one that the page is about.
+        large: Whether it may have `LARGE` bytes or more.
     """
     st.download_button(
         label,
         content,
         file,
-        MIMES[Path(file).suffix],
+        _AS_IT_IS if large else MIMES[Path(file).suffix],
         key=key,
         help=meaning,
         type=look,

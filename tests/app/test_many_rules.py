@@ -83,9 +83,9 @@ def test_a_file_is_unpacked_as_it_was_written(rules: RuleSet, suffix: str) -> No
     content = export_content(rules, suffix)
     file = ExportedFile.of(content, text=True)
     lines = content.decode().split("\n")[:-1]
-    assert file.content() == content
-    assert (file.size, file.lines) == (len(content), len(lines))
-    assert len(file.packed) < len(content) / 2
+    assert file.file.content() == content
+    assert (file.file.size, file.lines) == (len(content), len(lines))
+    assert len(file.file.packed) < len(content) / 2
     shown = file.beginning.split("\n")
     assert len(shown) == LINES
     assert len(file.beginning) <= MOST_SIGNS + 3 * LINES
@@ -98,7 +98,7 @@ def test_a_short_file_and_one_that_is_no_text() -> None:
     file = ExportedFile.of(b"one\ntwo", text=True)
     assert (file.lines, file.beginning, file.cut) == (2, "one\ntwo", False)
     file = ExportedFile.of(bytes(range(256)), text=False)
-    assert (file.lines, file.content()) == (0, bytes(range(256)))
+    assert (file.lines, file.file.content()) == (0, bytes(range(256)))
 
 
 def test_a_rule_set_that_several_results_hold_counts_once(rules: RuleSet) -> None:

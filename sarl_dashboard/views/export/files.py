@@ -20,7 +20,7 @@ from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_dashboard.cache import cached
-from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.downloads import LARGE, PackedFile, download
 from sarl_dashboard.state.sign_off import sign_off_here
 from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.export.settings import ExportSettings
@@ -52,27 +52,23 @@ def prepared_for(
 
 @dataclass(frozen=True, eq=False)
 class ExportedFile:
-    """A file to carry away. What takes hundreds of megabytes is held packed.
+    """A file to carry away, and what is seen of it.
 
     Attributes:
-        size: Bytes of it.
+        file: All of it.
         lines: How many it has, and the first of them; none where it is no text.
         beginning: At most `LINES` of them; where they are long, each as far as `LONGEST`.
         cut: Whether one of them goes on.
-        packed: Its content, as `zstd` packs it.
     """
 
-    size: int
+    file: PackedFile
     lines: int
     beginning: str
     cut: bool
-    packed: bytes
 
     @classmethod
     def of(cls, content: bytes, *, text: bool) -> ExportedFile:
         """Take a file's content."""
-        import pyarrow as pa
-
         end = 0
         for _ in range(LINES if text else 0):
             end = content.find(b"\n", end) + 1 or len(content)
@@ -81,14 +77,7 @@ class ExportedFile:
         short = lines
         if sum(map(len, lines)) > MOST_SIGNS:
             short = [line if len(line) <= LONGEST else f"{line[:LONGEST]} …" for line in lines]
-        packed = pa.compress(content, codec="zstd", asbytes=True)
-        return cls(len(content), count, "\n".join(short), short != lines, packed)
-
-    def content(self) -> bytes:
-        """All of it."""
-        import pyarrow as pa
-
-        return bytes(pa.decompress(self.packed, self.size, codec="zstd", asbytes=True))
+        return cls(PackedFile.of(content), count, "\n".join(short), short != lines)
 
 
 @cached(show_spinner="Writing …", hash_funcs={SignOff: sign_off_text})
@@ -123,7 +112,12 @@ def show_file(rule_set: RuleSet, settings: ExportSettings) -> None:
     name = f"{settings.stem}{form.suffix}"
     with st.container(horizontal=True, vertical_alignment="center"):
         download(
-            f"Download {form.suffix}", file.content, name, key="carry_download", look="primary"
+            f"Download {form.suffix}",
+            file.file.content,
+            name,
+            key="carry_download",
+            look="primary",
+            large=file.file.size >= LARGE,
         )
         download(
             "Test vectors",
@@ -134,7 +128,7 @@ def show_file(rule_set: RuleSet, settings: ExportSettings) -> None:
             meaning="States at every threshold and one step either side, with the rule and the "
             "action that must come out",
         )
-        st.caption(f"{form.meaning} {file.size / 1024:,.1f} kB.")
+        st.caption(f"{form.meaning} {file.file.size / 1024:,.1f} kB.")
     if sign_off is not None:
         st.caption(escaped(sign_off_text(sign_off)))
         before = sign_off_here(settings.rule_set)

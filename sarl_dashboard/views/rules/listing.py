@@ -17,7 +17,7 @@ from sarl_core.mining.language import action_text
 from sarl_core.mining.rule_set import RuleSet, rules_to_json
 from sarl_core.mining.validation.holding_out import lower_bound, shortfall, with_lower_bound
 from sarl_dashboard.cache import cached
-from sarl_dashboard.components.downloads import download
+from sarl_dashboard.components.downloads import PackedFile, download
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.lists.rule_search import have_word, names_have_word
 from sarl_dashboard.components.settings import search_box
@@ -135,19 +135,29 @@ def have_words(rule_set: RuleSet, words: tuple[str, ...]) -> NDArray[np.bool_]:
     return have
 
 
+_LARGE_SET = 10_000  # rules, of which a file may be as large as `downloads.LARGE`
+_WRITERS: dict[str, tuple[str, Callable[[RuleSet], str]]] = {
+    "json": ("JSON", rules_to_json),
+    "csv": ("CSV", rules_to_csv),
+    "txt": ("Text", RuleSet.to_text),
+}
+
+
+@cached()
+def _file_of(rule_set: RuleSet, ending: str) -> PackedFile:
+    return PackedFile.of(_WRITERS[ending][1](rule_set))
+
+
 def downloads(stem: str, count: int, make_set: Callable[[], RuleSet]) -> None:
     """The whole rule set as files, made when asked for."""
-    for kind, ending, write in (
-        ("JSON", "json", rules_to_json),
-        ("CSV", "csv", rules_to_csv),
-        ("Text", "txt", RuleSet.to_text),
-    ):
+    for ending, (kind, _) in _WRITERS.items():
         download(
             kind,
-            partial(lambda write: write(make_set()), write),
+            partial(lambda ending: _file_of(make_set(), ending).content(), ending),
             f"{stem}.{ending}",
             key=f"download_{ending}",
             meaning=f"All {count:,} rules" if count != 1 else "The one rule",
+            large=count > _LARGE_SET,
         )
 
 
