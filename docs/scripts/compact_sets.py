@@ -34,6 +34,7 @@ OPTIONS = {
     "divider": "divider",
     "turns": "refine",
     "search_episodes": "search-episodes",
+    "search_limit": "search-limit",
     "validation": "validation",
     "report": "report-episodes",
     "choose": "choose",
@@ -81,7 +82,9 @@ _WALKER = Plan(
 )
 SETS = {
     "cartpole_combined": RuleSetPlan("cartpole", _CARTPOLE, "every"),
-    "cartpole_compact": RuleSetPlan("cartpole", replace(_CARTPOLE, max_rules=3, turns=2)),
+    "cartpole_compact": RuleSetPlan(
+        "cartpole", replace(_CARTPOLE, max_rules=3, search_limit=1_500)
+    ),
     "lunar_lander_combined": RuleSetPlan(
         "lunar_lander", replace(_LANDER, max_rules=24, turns=3, validation=1_024), "every"
     ),

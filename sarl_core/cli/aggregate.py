@@ -110,6 +110,17 @@ def aggregate(
             show_default="16",
         ),
     ] = None,
+    search_limit: Annotated[
+        int | None,
+        typer.Option(
+            "--search-limit",
+            metavar="STEPS",
+            help="With --refine: let the episodes of the search go on for so many steps where the "
+            "environment would end them earlier. Where all that is tried achieves all there is, "
+            "that tells apart what would fail later.",
+            show_default="the environment's own",
+        ),
+    ] = None,
     validation: Annotated[
         int, typer.Option("--validation", help="Episodes by which the best is chosen.")
     ] = 256,
@@ -144,8 +155,9 @@ def aggregate(
         from sarl_core.improving.aggregation import recorded_environment
         from sarl_core.improving.plan import Plan
 
-        if search_episodes is not None and not refine:
-            raise InputError("--search-episodes are those of a refinement; give --refine, too")
+        if not refine and (search_episodes, search_limit) != (None, None):
+            name = "episodes" if search_episodes is not None else "limit"
+            raise InputError(f"--search-{name} is about a refinement; give --refine, too")
         plan = Plan(
             max_rules=max_rules,
             rounds=rounds,
@@ -155,6 +167,7 @@ def aggregate(
             projection=projection,
             turns=refine,
             search_episodes=Plan.search_episodes if search_episodes is None else search_episodes,
+            search_limit=search_limit,
             validation=validation,
             report=report,
             seed=seed,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, TypeAlias
 
 from sarl_core.documents import parse_json
@@ -106,6 +106,21 @@ def as_environment(environment: EnvironmentOrId) -> Environment:
         InputError: If it is neither.
     """
     return environment if isinstance(environment, Environment) else Environment(environment)
+
+
+def with_time_limit(environment: EnvironmentOrId, steps: int) -> Environment:
+    """The same environment, whose episodes end after other many steps.
+
+    Args:
+        environment: Of any time limit, or none.
+        steps: Its new one.
+
+    Returns:
+        The environment.
+    """
+    environment = as_environment(environment)
+    arguments = environment.keywords | {"max_episode_steps": steps}
+    return replace(environment, arguments=json.dumps(arguments))
 
 
 def _canonical(arguments: str) -> str:

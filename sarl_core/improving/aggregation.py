@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from sarl_core.agents.agent import Agent
 from sarl_core.agents.own import AgentFaultError
 from sarl_core.demonstrations.dataset import Demonstrations, derived_features
-from sarl_core.environments.environment import EnvironmentOrId
+from sarl_core.environments.environment import EnvironmentOrId, with_time_limit
 from sarl_core.errors import InputError
 from sarl_core.improving.alternation import ScoredStates, achieved, alternated, label_scores
 from sarl_core.improving.candidate import Candidate, Evaluator, structure_of
@@ -439,7 +439,9 @@ class _Run:
             self.trees,
             self.answers.pairs(0, derived=()),
             Evaluator(
-                self.env_id,
+                self.env_id
+                if plan.search_limit is None
+                else with_time_limit(self.env_id, plan.search_limit),
                 self.agent,
                 projection=plan.projection,
                 divider=plan.divider,

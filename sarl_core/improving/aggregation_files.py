@@ -126,6 +126,7 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         "episodes_a_round": plan.episodes,
         "turns": plan.turns,
         **({"search_episodes": plan.search_episodes} if plan.turns else {}),
+        **({} if plan.search_limit is None else {"search_limit": plan.search_limit}),
         "rounds": [_round(one) for one in aggregation.rounds],
         "chosen_round": aggregation.chosen,
         "refined": aggregation.refined,

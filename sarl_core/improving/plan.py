@@ -35,6 +35,8 @@ class Plan:
         projection: How the shield replaces a continuous action.
         turns: Of the refinement that follows; 0 for none.
         search_episodes: For each neighbour that it tries.
+        search_limit: Steps that its episodes may take where the environment would end them
+            earlier, so that what fails later is told apart, too; None for the environment's own.
         validation: Episodes by which the best of all is chosen in the end.
         report: Episodes of the final report.
         seed: Another one gives other episodes.
@@ -53,6 +55,7 @@ class Plan:
     projection: Projection = "centre"
     turns: int = 0
     search_episodes: int = 16
+    search_limit: int | None = None
     validation: int = 256
     report: int = 100
     seed: int = 0
@@ -84,7 +87,8 @@ class Plan:
             ("number of validation episodes", self.validation, 1, MOST_VALIDATION),
             ("number of report episodes", self.report, 1, MOST_VALIDATION),
             ("seed", self.seed, 0, None),
-            ("max_steps", 1 if self.max_steps is None else self.max_steps, 1, None),
+            ("limit of a search episode", _or_one(self.search_limit), 1, None),
+            ("max_steps", _or_one(self.max_steps), 1, None),
         ):
             _check_number(name, value, least, most)
         _check_number("number of turns", self.turns, 0, self._most_turns())
@@ -99,6 +103,10 @@ class Plan:
                 f"has {SEEDS_A_RUN:,}; give fewer rounds or --search-episodes"
             )
         return max(left, 0) // (one - none)
+
+
+def _or_one(number: int | None) -> int:
+    return 1 if number is None else number
 
 
 def _check_number(name: str, value: int, least: int, most: int | None) -> None:

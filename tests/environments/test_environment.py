@@ -7,6 +7,7 @@ import pytest
 
 from sarl_core import Environment, InputError
 from sarl_core.environments.description import describe_environment, make_environment
+from sarl_core.environments.environment import with_time_limit
 
 FLAT = "gymnasium.wrappers:FlattenObservation"
 
@@ -34,6 +35,16 @@ def test_arguments_and_wrappers_reach_the_environment_innermost_first() -> None:
         describe_environment(Environment("CartPole-v1", '{"max_episode_steps": 7}')).max_steps == 7
     )
     assert describe_environment("CartPole-v1").max_steps == 500
+
+
+def test_a_time_limit_is_an_argument_and_nothing_else_changes() -> None:
+    moon = Environment("Pendulum-v1", '{"g": 1.6}', (FLAT,), failure="fell")
+    longer = with_time_limit(moon, 900)
+    assert longer == Environment(
+        "Pendulum-v1", '{"g": 1.6, "max_episode_steps": 900}', (FLAT,), failure="fell"
+    )
+    assert describe_environment(with_time_limit("CartPole-v1", 900)).max_steps == 900
+    assert with_time_limit(longer, 5).keywords["max_episode_steps"] == 5
 
 
 @pytest.mark.parametrize(

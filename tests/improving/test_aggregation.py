@@ -17,6 +17,7 @@ from sarl_core.improving.alternation import ScoredStates, alternated
 from sarl_core.improving.candidate import structure_of
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import ask, importance, scores
+from sarl_core.improving.refinement import Refinement
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.growing.structure import count_tree
 from sarl_core.mining.rule_set import RuleSet
@@ -111,6 +112,28 @@ def test_states_in_which_a_formula_has_no_value_are_not_learned_from(cart, small
     assert found.is_finished
 
 
+def test_episodes_of_the_search_alone_go_on_beyond_the_limit(cart, small_search, monkeypatch):
+    longest = {}
+    play = Refinement._play
+
+    def noted(self, *arguments, **named):
+        played = play(self, *arguments, **named)
+        limit = self._evaluator.env_id
+        longest[limit] = max(longest.get(limit, 0), int(played.lengths.max()))
+        return played
+
+    monkeypatch.setattr(Refinement, "_play", noted)
+    plan = Plan(
+        max_rules=4, rounds=1, episodes=4, validation=8, report=8, turns=1, search_limit=700
+    )
+    found = aggregate(cart, plan)
+    (environment,) = longest
+    assert (environment.id, environment.keywords) == ("CartPole-v1", {"max_episode_steps": 700})
+    assert 500 < longest[environment] <= 700
+    assert found.reported.lengths.max() <= 500
+    assert found.env_id == "CartPole-v1"
+
+
 def test_another_seed_gives_other_episodes(cart, small, found):
     other = aggregate(cart, replace(small, seed=1, rounds=1))
     assert not np.array_equal(other.rounds[0].returns, found.rounds[0].returns)
@@ -162,6 +185,7 @@ def test_the_card_says_how_the_rules_came_about(found, tmp_path):
         ({"turns": 1, "search_episodes": 0}, "the number of search episodes is 0"),
         ({"turns": 1, "search_episodes": 10**9}, "give 1,000 or fewer"),
         ({"turns": 1, "rounds": 400, "search_episodes": 1_000}, "give fewer rounds or"),
+        ({"turns": 1, "search_limit": 0}, "the limit of a search episode is 0"),
         ({"seed": -1}, "the seed is -1"),
     ],
 )
