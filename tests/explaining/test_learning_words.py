@@ -18,9 +18,10 @@ from sarl_core.explaining.figures.learning import (
 from sarl_core.explaining.words.learning import HEADINGS, finding, table_rows, verdict
 from sarl_core.learning.arms import ARMS
 from sarl_core.learning.curves import Columns, Trial
-from sarl_core.learning.study_files import ComparedAgent, LearningRun, LearningStudy
+from sarl_core.learning.study_files import ComparedAgent, LearningRun, LearningStudy, load_study
 from sarl_core.learning.summary import summarise_compared, summarise_study
 
+STUDIES = Path(__file__).parents[2] / "data" / "learning"
 RULES = {"count": 3274, "support": 0.0, "confidence": 1.0, "digest": ""}
 
 
@@ -209,6 +210,23 @@ def test_an_agent_for_comparison_stands_below_and_is_a_line(study: LearningStudy
 )
 def test_values_for_people(value: float, text: str) -> None:
     assert rounded_text(value) == text
+
+
+def test_no_name_stands_on_another_on_a_narrow_screen() -> None:
+    study = load_study(STUDIES / "cartpole")
+    figure = outcome_figure(summarise_study(study))
+    names = [one for one in figure.layout.annotations if one.text.startswith("<b>")]
+    assert len(names) == len(study.arms)
+    (left, right), (bottom, top) = figure.layout.xaxis.range, figure.layout.yaxis.range
+    boxes = []
+    for one in names:  # as wide as letters are on average
+        x = 295 * (one.x - left) / (right - left) + one.xshift
+        y = 380 * (one.y - bottom) / (top - bottom) + one.yshift
+        long = 6.5 * (len(one.text) - 7)
+        boxes.append((x - long, x, y) if one.xanchor == "right" else (x, x + long, y))
+    for place, (start, end, y) in enumerate(boxes):
+        for other_start, other_end, other_y in boxes[:place]:
+            assert end <= other_start or other_end <= start or abs(y - other_y) > 14
 
 
 def test_each_arm_has_a_colour() -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import plotly.graph_objects as go
@@ -39,10 +39,14 @@ _COLOURS = {
     "none-replay": MUTED_COLOUR,
     "replay": _BROWN,
 }
-_GOOD = "#009E73"
+_GOOD, _CORNER = "#009E73", "safe and good"
 _BINS = 24
 _PANELS = ("return of an episode", "failures so far", "changed by the rules")
 _ROW_HEIGHT = 46
+_NARROW = (295, 380)  # pixels of a plot on a narrow screen
+_POINT, _GAP, _LETTER, _LINE = 8, 11, 6.8, 15  # pixels of a point and of its name
+_UPS = (0, 17, -17, 34, -34, 51, -51)
+_Box = tuple[float, float, float, float]
 
 
 def arm_colour(arm: LearningArm) -> str:
@@ -147,7 +151,7 @@ def outcome_figure(
         figure.add_annotation(
             x=SAFE_SHARE * plain.mean_crashes,
             y=top,
-            text="safe and good",
+            text=_CORNER,
             showarrow=False,
             xanchor="right",
             yanchor="top",
@@ -163,7 +167,7 @@ def outcome_figure(
                 "xanchor": "right",
             },
         )
-    for one, place in zip(summaries, _places(summaries, span, width), strict=True):
+    for one, place in zip(summaries, _label_places(summaries, (bottom, top), width), strict=True):
         colour = arm_colour(one.arm)
         figure.add_scatter(
             x=one.crashes,
@@ -179,10 +183,8 @@ def outcome_figure(
         figure.add_scatter(
             x=[one.mean_crashes],
             y=[one.alone.mean],
-            mode="markers+text",
+            mode="markers",
             text=[f"<b>{one.arm.title}</b>"],
-            textposition=place,
-            textfont={"size": 12},
             cliponaxis=False,
             marker={
                 "color": colour,
@@ -194,6 +196,16 @@ def outcome_figure(
                 f"{one.arm.title}<br>%{{x:,.0f}} failures while learning<br>return afterwards "
                 f"%{{y:,.0f}}<br>mean of {len(one.seeds)}<extra></extra>"
             ),
+        )
+        figure.add_annotation(
+            x=one.mean_crashes,
+            y=one.alone.mean,
+            text=f"<b>{one.arm.title}</b>",
+            showarrow=False,
+            xanchor="right" if place.left else "left",
+            xshift=-_GAP if place.left else _GAP,
+            yshift=place.up,
+            font={"size": 12},
         )
     figure.update_layout(**figure_layout(height, margin={"r": 16}, showlegend=False))
     figure.update_xaxes(
@@ -387,17 +399,47 @@ def _symbol(arm: LearningArm) -> str:
     return "square" if arm.replay else "circle"
 
 
-def _places(summaries: Sequence[ArmSummary], span: float, width: float) -> list[str]:
-    """Where each name stands, so that those of near points do not cover each other."""
-    places: list[str] = []
-    for index, one in enumerate(summaries):
-        side = "left" if one.mean_crashes > 0.6 * width else "right"
-        near = [
-            places[other]
-            for other in range(index)
-            if abs(summaries[other].alone.mean - one.alone.mean) < 0.06 * span
-            and abs(summaries[other].mean_crashes - one.mean_crashes) < 0.3 * width
-        ]
-        options = [f"middle {side}", f"top {side}", f"bottom {side}", "bottom center"]
-        places.append(next((place for place in options if place not in near), options[0]))
+class _LabelPlace(NamedTuple):
+    """Where a name stands beside its point: on which side, and how many pixels further up."""
+
+    left: bool
+    up: int
+
+
+def _label_places(
+    summaries: Sequence[ArmSummary], ends: tuple[float, float], width: float
+) -> list[_LabelPlace]:
+    """Where each name stands, so that none covers another or a point, on a narrow screen too.
+
+    Args:
+        summaries: Whose names they are.
+        ends: Of the returns, the least first.
+        width: Most failures.
+    """
+    across, high = _NARROW
+    points = [
+        (
+            across * (one.mean_crashes / width + 0.02) / 1.02,
+            high * (one.alone.mean - ends[0]) / (ends[1] - ends[0]),
+        )
+        for one in summaries
+    ]
+    taken = [(x - _POINT, x + _POINT, y - _POINT, y + _POINT) for x, y in points]
+    for one, (x, _) in zip(summaries, points, strict=True):
+        if one.arm.name == "none":  # by which the corner is drawn, with its name at the top
+            end = SAFE_SHARE * x + (1 - SAFE_SHARE) * across * 0.02 / 1.02
+            taken.append((end - _LETTER * len(_CORNER), end, high - _LINE, high))
+    places: list[_LabelPlace] = []
+    for one, (x, y) in zip(summaries, points, strict=True):
+        left, long = one.mean_crashes > 0.6 * width, _GAP + _LETTER * len(one.arm.title)
+        sides = (x - long, x - _GAP) if left else (x + _GAP, x + long)
+        boxes = {up: (*sides, y + up - _LINE / 2, y + up + _LINE / 2) for up in _UPS}
+        free = [up for up, box in boxes.items() if not any(_covers(box, other) for other in taken)]
+        up = free[0] if free else 0
+        taken.append(boxes[up])
+        places.append(_LabelPlace(left, up))
     return places
+
+
+def _covers(one: _Box, other: _Box) -> bool:
+    return one[0] < other[1] and other[0] < one[1] and one[2] < other[3] and other[2] < one[3]
