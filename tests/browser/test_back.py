@@ -57,9 +57,12 @@ def test_thresholds_go_back_on_pages_without_sliders(screen: Page) -> None:
     settle(screen)
     go(screen, "Rules")
     expect(in_force).to_contain_text("Support at least 0")
-    for _ in range(3):
+    slider = screen.get_by_role("slider", name="Minimum support")
+    for support in ("0", "0.05"):
         screen.go_back()
+        expect(slider).to_have_attribute("aria-valuetext", support)
         settle(screen)
+    screen.go_back()
     expect(screen.get_by_role("heading", name="Rules", level=1)).to_be_visible()
     expect(in_force).to_contain_text("Support at least 0.05")
     assert parameters(screen)["support"] == "0.05"
