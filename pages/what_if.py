@@ -10,6 +10,7 @@ from sarl_dashboard.components.settings import (
     outside_choice,
     projection_choice,
 )
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state.agents import PROJECTIONS
 from sarl_dashboard.state.data import require_demonstrations
 from sarl_dashboard.views.what_if.answer import question_and_answer
@@ -31,7 +32,7 @@ if not rules.rule_set.rules:
         icon=":material/filter_alt_off:",
     )
     st.page_link("thresholds.py", label="Go to Thresholds", icon=":material/arrow_forward:")
-    st.stop()
+    end_page()
 with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
     outside = outside_choice(220)
     projection: Projection = PROJECTIONS[0]

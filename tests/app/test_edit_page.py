@@ -262,7 +262,7 @@ def test_the_file_holds_the_edits_and_others_can_choose_them() -> None:
     assert f"{len(FILTERED):,} rules (edited)" in texts(app)
     app.switch_page("difference.py").run()
     assert app.multiselect(key="_sets_choice").value == ["before the edits", "edited"]
-    rows = app.dataframe[2].value
+    rows = app.dataframe[1].value
     assert rows["Rule"].tolist() == [off]
     assert rows["Change"].tolist() == ["switched off; pinned"]
     app.switch_page("edit.py").run()

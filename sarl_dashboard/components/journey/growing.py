@@ -8,6 +8,7 @@ import streamlit as st
 
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs import growing
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.thresholds import chosen_divider
@@ -41,4 +42,4 @@ def require_trees(title: str) -> None:
         label="Grow the tree",
     )
     watched(growing.PLACE, lambda _: run_bar(growing.PLACE, offer))
-    st.stop()
+    end_page()

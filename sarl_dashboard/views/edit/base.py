@@ -5,6 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.errors import SarlError
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.text import in_full
@@ -16,4 +17,4 @@ def edited_base() -> Base:
         return rule_base.base()
     except SarlError as problem:
         st.info(in_full(str(problem)), icon=":material/upload_file:")
-        st.stop()
+        end_page()

@@ -12,6 +12,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import projection_choice, rule_set_choice
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state.agents import PROJECTIONS
 from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.state.rule_files import PAPERS
@@ -80,7 +81,7 @@ def chosen_rules() -> tuple[str, RuleSet]:
         rule_set = rules_for(choice)
     except SarlError as error:
         refuse(error)
-        st.stop()
+        end_page()
     assert rule_set is not None
     return choice, rule_set
 

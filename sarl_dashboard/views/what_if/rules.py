@@ -11,6 +11,7 @@ from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.components.settings import notes_notice
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state import compact_set, edits, in_force, rule_base
 from sarl_dashboard.state.mined import grown_trees, rules_at
 from sarl_dashboard.state.rule_files import fitting_demonstrations
@@ -49,7 +50,7 @@ def chosen_rules(demonstrations: Demonstrations) -> RulesOnTrees:
             "choose the demonstrations of their environment, or other rules, in the sidebar.",
             icon=":material/swap_horiz:",
         )
-        st.stop()
+        end_page()
     rules, notes = rules_for(rules, fitted)
     notes_notice(notes)
     base = rule_base.base()
