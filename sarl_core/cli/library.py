@@ -12,7 +12,7 @@ import typer
 
 from sarl_core.cli import stand_ins, terminal
 from sarl_core.cli.options import Json, out_option
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 
 if TYPE_CHECKING:
     from sarl_core.library import Item, Library
@@ -76,7 +76,13 @@ def _file_of(value: str) -> Path:
     from sarl_core.library.contents import annotated_file
 
     with _opened() as opened:  # what is put aside goes when the command ends
-        return annotated_file(opened, opened.item(value), Path(tempfile.mkdtemp()))
+        item = opened.item(value)
+        if item.removed is not None:
+            raise InputError(
+                f"{quoted(item.name)} was removed by {item.author}, who brings it back with "
+                f"`sarl library remove {item.id} --undo`; until then name something else"
+            )
+        return annotated_file(opened, item, Path(tempfile.mkdtemp()))
 
 
 @library.command("list")

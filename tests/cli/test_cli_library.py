@@ -91,6 +91,19 @@ def test_removing_can_be_undone(run):
     assert rules["id"] in run("library", "list")
 
 
+def test_what_was_removed_stands_for_no_file(run, capsys):
+    rules = imported(run, RULES)
+    run("library", "approve", rules["id"])
+    run("library", "remove", f"library:{rules['id']}")
+    # It would be said to be approved by nobody, as what was removed approves nothing.
+    assert main(["audit", f"library:{rules['id']}", str(CART)]) == 2
+    said = capsys.readouterr().err
+    assert "was removed by Ada" in said
+    assert f"`sarl library remove {rules['id']} --undo`" in said
+    run("library", "remove", f"library:{rules['id']}", "--undo")
+    assert "Approved by Ada" in run("audit", f"library:{rules['id']}", CART)
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "says"),
     [
