@@ -8,7 +8,7 @@ import streamlit as st
 
 from sarl_core.explaining.templates import style_sheet
 from sarl_dashboard.components.journey.brand import ICON, show_logo
-from sarl_dashboard.components.journey.first_run import show_first_run
+from sarl_dashboard.components.journey.first_run import show_first_run, take_up
 from sarl_dashboard.components.journey.growing import require_trees
 from sarl_dashboard.components.journey.next_step import next_step
 from sarl_dashboard.components.journey.words import words_button
@@ -107,6 +107,7 @@ show_left_out(page.title, left_out)
 try:
     data_words.take_up()
     in_force.take_up()
+    take_up()
     sidebar(with_thresholds=page.title != "Thresholds")
 finally:
     write_url()

@@ -95,7 +95,7 @@ NONSENSE = {
     # What is beside every page.
     "overview": (
         *("support", "confidence", "lift", "depth", "divider"),
-        *("holdout", "holdout_seed", "left_out", "combine"),
+        *("holdout", "holdout_seed", "left_out", "combine", "first_run"),
     ),
     "rules": ("rule",),
     "edit": ("rule",),

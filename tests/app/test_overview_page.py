@@ -152,3 +152,15 @@ def test_the_first_run_waits_while_one_looks_elsewhere_and_ends_when_told_to() -
     app.button(key="first_run_end").click().run()
     assert app.title[0].value == "Demonstrations"
     assert "First run" not in texts(app)
+
+
+def test_the_first_run_goes_on_after_a_reload_and_a_restart() -> None:
+    app = open_page("rules", set="fewest, two features", first_run="3")
+    assert "step 3 of 5" in texts(app)
+    assert STEPS[2].task in texts(app)
+    assert app.query_params["first_run"] == "3"
+    app.button(key="first_run_end").click().run()
+    assert "First run" not in texts(app)
+    assert "first_run" not in app.query_params
+    for number in ("0", "6", "x"):
+        assert "First run" not in texts(open_page("rules", first_run=number))

@@ -9,8 +9,9 @@ import streamlit as st
 from sarl_dashboard.state.data import DEFAULT_DATA
 from sarl_dashboard.state.rule_files import FEWEST
 from sarl_dashboard.state.thresholds import THRESHOLDS
+from sarl_dashboard.state.url import set_url_choice, url_choice
 
-_STEP, _DONE = "_first_run", "_first_run_done"
+_STEP, _DONE = "first_run", "_first_run_done"
 _TASK = {"data": DEFAULT_DATA}
 _SLIDERS = {**_TASK, "set": THRESHOLDS}
 _SIX_RULES = {**_TASK, "set": FEWEST}
@@ -87,10 +88,18 @@ def begin_first_run() -> None:
     _go(0)
 
 
+def take_up() -> None:
+    """Let the URL say where the first run is, so that it goes on after a reload (URL: first_run).
+
+    Before the URL is written, that every page and link of the run has it at once.
+    """
+    url_choice("first_run", ["", *(str(number + 1) for number in range(len(STEPS)))], "")
+
+
 def step_at_hand() -> int | None:
     """Which step is next, from 0; None where there is no first run under way."""
-    number = st.session_state.get(_STEP)
-    return number if isinstance(number, int) else None
+    number = st.session_state.get(f"_{_STEP}")
+    return int(number) - 1 if number else None
 
 
 def first_run_done() -> bool:
@@ -99,13 +108,12 @@ def first_run_done() -> bool:
 
 
 def _go(number: int) -> None:
-    st.session_state[_STEP] = number
     step = STEPS[number]
-    st.switch_page(step.file, query_params=step.query)
+    st.switch_page(step.file, query_params={**step.query, _STEP: str(number + 1)})
 
 
 def _end() -> None:
-    st.session_state.pop(_STEP, None)
+    set_url_choice(_STEP, "")
 
 
 def show_first_run(page: str) -> None:
