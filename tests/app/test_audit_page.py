@@ -113,6 +113,34 @@ def test_what_was_said_of_the_columns_is_kept_with_the_log(tmp_path: Path) -> No
     assert errors(again) == errors(app)
 
 
+def test_another_log_with_the_columns_of_the_first_is_kept_as_they_were_read(
+    tmp_path: Path,
+) -> None:
+    log = load_demonstrations(DATA / "cartpole.parquet").select(range(2))
+    columns = dict(zip(log.feature_names, log.observations.T, strict=True))
+    frame = pd.DataFrame({"run": log.episodes, **columns, "cmd": log.actions})
+    app = open_page("audit", data="cartpole", support="0.01", confidence="0.9")
+    for number, key in enumerate(("log", "other_log")):
+        path = tmp_path / f"{key}.csv"
+        frame.iloc[number:].to_csv(path, index=False)
+        app.file_uploader(key=f"{key}_file").set_value(upload(path)).run()
+        if key == "log":
+            assert errors(app)  # which column is the action, a person has to say
+            app.button(key="log_map_read").click().run()
+    assert not errors(app)
+    link, before = address(app), texts(app)
+    assert sorted(item.name for item in logs()) == ["log.csv", "other_log.csv"]
+    again = open_page("audit", **link)
+    assert not errors(again)
+    assert metrics(again) == metrics(app)
+    assert "Whether the two logs differ" in before
+    assert "Whether the two logs differ" in texts(again)
+    app.button(key="keep_audit").click().run()
+    with Library() as library:
+        (kept,) = library.items("Ada", kind="result")
+    assert {item.id for item in logs()} <= set(kept.came_from)
+
+
 @pytest.mark.parametrize(
     ("named", "sentence"),
     [

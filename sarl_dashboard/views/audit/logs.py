@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -119,8 +119,9 @@ def chosen_logs(rules: ChosenRules) -> Logs:
     other = None
     if after is not None:
         # What was said of the columns of one log is true of another with the same columns.
-        said = log.roles if after.columns == log.columns else ()
-        other = _answer(rules, after, after.roles or said)
+        if not after.roles and after.columns == log.columns:
+            after = after.with_roles(log.roles)
+        other = _answer(rules, after, after.roles)
     if held is None or (after is not None and other is None):
         end_page()
     comparison = None if other is None else LogComparison(held, other)
@@ -170,6 +171,19 @@ class _Log:
     @property
     def columns(self) -> tuple[str, ...]:
         return tuple(one.name for one in self.form.previews)
+
+    def with_roles(self, roles: _Roles) -> _Log:
+        """The same with what was said of another one's columns; kept so, if it was not yet.
+
+        Args:
+            roles: What was said.
+        """
+        if not roles or self.identifier:
+            return replace(self, roles=roles)
+        state = st.session_state
+        state[f"_{self.key}_roles"] = roles
+        _keep(self.key, self.file, roles)
+        return replace(self, roles=roles, identifier=state.get(f"_{self.key}_id", ""))
 
     def read(self) -> None:
         """Take the columns as they stand in the form; for a callback."""
