@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from sarl_core import audit, load_demonstrations, mine_rules
-from tests.app.screens import ROUTER, html, open_page, texts
+from sarl_core.library import Library
+from sarl_core.library.contents import add_rules
+from tests.app.screens import ROUTER, errors, html, open_page, texts
 
 FILE = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
 
@@ -38,3 +40,13 @@ def test_a_step_shows_its_rule_its_state_and_its_scene() -> None:
 
 def test_without_demonstrations_it_says_what_to_do() -> None:
     assert "Upload a file on the Demonstrations page" in texts(open_page("episodes", data="upload"))
+
+
+def test_rules_of_another_environment_are_refused_with_what_to_do() -> None:
+    rules = mine_rules(load_demonstrations(FILE), supp_min=0.01, conf_min=0.9)
+    with Library() as library:
+        item = add_rules(library, rules, author="Ada", name="cart")
+    app = open_page("episodes", data="lunar_lander", set=item.id)
+    assert len(errors(app)) == 1
+    assert "choose the demonstrations of their environment" in texts(app)
+    assert not html(app)

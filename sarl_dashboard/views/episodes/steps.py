@@ -8,6 +8,7 @@ import streamlit as st
 
 from sarl_core.auditing.audit import Audit, audit
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
 from sarl_core.explaining.figures.audit import audit_tracks, feature_lines, step_texts
 from sarl_core.explaining.figures.replay import Timeline, intervention_strip
 from sarl_core.explaining.html.step_card import state_table
@@ -17,8 +18,9 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.log_step import show_step
 from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_room, show_legend
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state import in_force
-from sarl_dashboard.text import escaped
+from sarl_dashboard.text import escaped, refuse
 from sarl_dashboard.views.episodes.scene import show_scene
 
 _MOST_STEPS = 2_000  # that are drawn at once; of a longer episode, those around the step
@@ -35,7 +37,16 @@ def show_episodes(demonstrations: Demonstrations) -> None:
     left, right = st.columns(2)
     with left:
         episode = int(episodes[_number("Episode", "episode", len(episodes) - 1)])
-    held = _held(in_force.rules(), demonstrations, episode)
+    try:
+        held = _held(in_force.rules(), demonstrations, episode)
+    except InputError as error:
+        refuse(error)
+        st.info(
+            "The rules in force are not for these demonstrations; choose the demonstrations of "
+            "their environment, or other rules, in the sidebar.",
+            icon=":material/swap_horiz:",
+        )
+        end_page()
     with right:
         current = _number("Step", "step", held.steps - 1)
     st.caption(
