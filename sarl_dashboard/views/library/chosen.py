@@ -19,7 +19,7 @@ from sarl_core.library.items import UNLISTED
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import in_force
-from sarl_dashboard.state.data import choose_dataset
+from sarl_dashboard.state.data import SHIPPED_SETS, all_demonstrations, choose_dataset
 from sarl_dashboard.state.rule_choice import comparison_address
 from sarl_dashboard.state.url import set_url_choice
 from sarl_dashboard.text import escaped, file_name
@@ -193,13 +193,27 @@ def _rules(opened: Library, item: Item, author: str) -> None:
 
 
 def _put_in_force(opened: Library, item: Item) -> None:
-    """Choose the rules, and the data that they were made from where these are kept."""
+    """Choose the rules, and the data that they were made from, kept or shipped."""
+    data = ""
     for identifier in item.came_from:
         with suppress(SarlError):
             source = opened.item(identifier)
             if source.kind == "demonstrations" and source.removed is None:
-                choose_dataset(source.id)
+                data = source.id
+    data = data or _shipped_for(str(item.details.get("environment", "")))
+    if data:
+        choose_dataset(data)
     in_force.choose(item.id)
+
+
+def _shipped_for(environment: str) -> str:
+    """The shipped data of an environment; "" where there are none, or others of it are chosen."""
+    chosen = None
+    with suppress(SarlError):
+        chosen = all_demonstrations()
+    if chosen is not None and chosen.env_id == environment:
+        return ""
+    return next((name for name, (_, one) in SHIPPED_SETS.items() if one == environment), "")
 
 
 def _approve(opened: Library, item: Item, author: str) -> None:
