@@ -13,7 +13,7 @@ from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.state import edits, library, rule_base
 from sarl_dashboard.state import in_force as rules_in_force
-from sarl_dashboard.state.data import chosen_dataset, raw_demonstrations
+from sarl_dashboard.state.data import chosen_dataset, dataset_label, raw_demonstrations
 from sarl_dashboard.text import refuse
 
 
@@ -30,7 +30,10 @@ def keep_rules_form(
     raw = raw_demonstrations()
     if raw is None:
         return
-    usual = f"{counted(len(rule_set), 'rule')} for {rule_set.source.env_id or 'these data'}"
+    switched_on = sum(rule.enabled for rule in rule_set)
+    # In a list of everything that is kept nobody knows which data "these" were.
+    task = rule_set.source.env_id or dataset_label(chosen_dataset())
+    usual = f"{counted(switched_on, 'rule')} for {task}"
     with st.container(horizontal=True, vertical_alignment="bottom"):
         name = st.text_input("Keep in the library as", usual, key="keep_name", max_chars=200)
         pressed = st.button("Keep", key="keep_rules", icon=":material/inventory_2:")

@@ -241,6 +241,8 @@ def test_rules_are_kept_as_versions_and_approved_one_by_one() -> None:
 def test_what_is_kept_of_edited_rules_knows_its_edits_and_its_parent_and_is_put_in_force() -> None:
     app = open_page("edit", data="cartpole")
     app.button(key="edit_switch").click().run()
+    counted = f"{metrics(app)['Rules in force']} rules for CartPole-v1"
+    assert app.text_input(key="keep_name").value == counted
     app.text_input(key="keep_name").set_value("without one").run()
     app.button(key="keep_rules").click().run()
     assert not errors(app)
