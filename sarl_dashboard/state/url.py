@@ -197,6 +197,15 @@ def note_unusable(name: str, value: str) -> None:
         st.session_state["_unusable"].append(name)
 
 
+def leave_to_page(name: str) -> None:
+    """Say nothing of what the link says of a parameter: its page says more than could be said here.
+
+    Args:
+        name: URL parameter.
+    """
+    _link().pop(name, None)
+
+
 def _link() -> dict[str, list[str]]:
     """What the link that opened the page says, as far as nothing has made use of it yet."""
     return cast("dict[str, list[str]]", st.session_state.setdefault("_link", {}))

@@ -25,7 +25,7 @@ from sarl_dashboard.state import edits, in_force
 from sarl_dashboard.state.data import chosen_demonstrations, held_out_demonstrations
 from sarl_dashboard.state.mined import Trees, mined_landscape
 from sarl_dashboard.state.rule_base import Base
-from sarl_dashboard.state.url import set_url_choice, url_choice
+from sarl_dashboard.state.url import leave_to_page, set_url_choice, url_choice
 from sarl_dashboard.text import escaped, in_full
 
 TABLE_ROWS = 10
@@ -188,6 +188,7 @@ def _queries(chosen: TreePart) -> None:
         misfit = _misfit(link, chosen)
         if misfit:
             st.warning(in_full(misfit), icon=":material/link_off:")
+            leave_to_page("regrow")
     choice = url_choice("regrow", ["", *texts], "")
     row = texts.index(choice) if choice in texts else None
     every = chosen.tree.samples[chosen.place] <= MOST_GROWN and len(demonstrations) <= MOST_COUNTED
