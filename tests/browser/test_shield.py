@@ -48,7 +48,7 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
 
 
 def test_the_divider_is_studied(screen: Page) -> None:
-    visit(screen, "/thresholds?data=pendulum&details=Divider&divider_episodes=2", "Thresholds")
+    visit(screen, "/thresholds?data=pendulum&details=Divider&divider_episodes=3", "Thresholds")
     expect(screen.get_by_text("How far an action moves")).to_be_visible()
     screen.get_by_role("button", name="Run", exact=True).click()
     expect(screen.get_by_text("all done already")).to_be_visible(timeout=PATIENCE)
