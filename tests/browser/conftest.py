@@ -49,13 +49,15 @@ def dashboard(folder: Path, **variables: str) -> Iterator[str]:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     log = folder / "log.txt"
+    # A library of its own: what other tests of this process keep would be there again.
+    own = {"HOME": str(folder), "SARL_LIBRARY": str(folder / "library")}
     with log.open("wb") as out:
         server = subprocess.Popen(
             [sys.executable, "-m", "streamlit", "run", "app.py", "--server.port", str(port)],
             cwd=ROOT,
             stdout=out,
             stderr=subprocess.STDOUT,
-            env=os.environ | {"HOME": str(folder)} | variables,
+            env=os.environ | own | variables,
         )
         try:
             url = f"http://127.0.0.1:{port}"
