@@ -166,7 +166,7 @@ def along_paths(rules: Iterable[Rule], start: T, step: Callable[[T, Condition], 
     values = [start]
     for rule in rules:
         shared = 0
-        for before, condition in zip(path, rule.conditions):  # noqa: B905, as far as both go
+        for before, condition in zip(path, rule.conditions, strict=False):
             if before is not condition and before != condition:
                 break
             shared += 1

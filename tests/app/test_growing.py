@@ -8,7 +8,6 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core.errors import WorkError
-from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_dashboard.cache import RESULTS
 from sarl_dashboard.jobs import growing
 from tests.app.screens import errors, metrics, open_page, page_file, texts
@@ -23,9 +22,8 @@ def many(monkeypatch: pytest.MonkeyPatch) -> None:
     RESULTS.clear()
 
 
-def slow(*arguments: object) -> object:
+def slow(*_: object) -> None:
     time.sleep(WAIT)
-    return grow_policy_trees(*arguments)  # type: ignore[arg-type]
 
 
 def work_of(app: AppTest) -> growing.Job[growing.Trees]:

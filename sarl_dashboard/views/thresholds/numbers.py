@@ -60,9 +60,7 @@ def show_numbers(point: Landscape, judged: Judged | None, tree: PolicyTree | Non
             st.caption(
                 f"Learner: {LEARNERS[tree.learner].lower()}",
                 width="content",
-                help=with_words(
-                    f"{learner_text(tree.learner)[0].upper()}{learner_text(tree.learner)[1:]}."
-                ),
+                help=with_words(f"{learner_text(tree.learner).capitalize()}."),
             )
     missing = "" if tree is None else missing_learner_text(chosen_learner(), tree.source.steps)
     if missing:
