@@ -31,12 +31,13 @@ WORST = 0.005
 """Of accuracy: what a faster learner may lose."""
 
 
-def pairs(rows: int, seed: int) -> Demonstrations:
+def pairs(rows: int, seed: int, first: int = 0) -> Demonstrations:
     """Pairs of an expert that weighs a few features against others, and is often undecided.
 
     Args:
         rows: How many, in episodes of `STEPS`.
         seed: Same seed, same pairs.
+        first: Number of the first episode.
 
     Returns:
         States of 24 features and one of 4 labels each.
@@ -56,7 +57,7 @@ def pairs(rows: int, seed: int) -> Demonstrations:
     return Demonstrations(
         states,
         leaning.argmax(axis=1),
-        np.arange(rows) // STEPS,
+        first + np.arange(rows) // STEPS,
         label_names=(("left", "right", "brake", "go on"),),
     )
 
@@ -114,10 +115,10 @@ def main() -> None:
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)
     for number in range(arguments.files):
-        part = arguments.rows * (number + 1) // arguments.files
-        part -= arguments.rows * number // arguments.files
+        start = arguments.rows * number // arguments.files
+        part = arguments.rows * (number + 1) // arguments.files - start
         path = arguments.folder / f"part-{number:03d}.parquet"
-        save_demonstrations(pairs(part, seed=1_000 + number), path)
+        save_demonstrations(pairs(part, seed=1_000 + number, first=start // STEPS), path)
         print(f"wrote {path}")
 
 

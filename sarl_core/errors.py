@@ -16,6 +16,7 @@ _EXTRAS = {
     "stable_baselines3": "learning",
     "torch": "learning",
     "sklearnex": "large",
+    "distributed": "cluster",
     "imageio": "video",
     "imageio_ffmpeg": "video",
 }

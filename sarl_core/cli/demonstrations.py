@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import path_of, read_agent, read_demonstrations, with_wanted
+from sarl_core.cli.inputs import (
+    is_mined_file,
+    path_of,
+    read_agent,
+    read_demonstrations,
+    with_wanted,
+)
 from sarl_core.cli.options import (
     AgentName,
     Columns,
@@ -104,6 +110,9 @@ def check(
     if suggest is not None:
         _suggest_columns(files, columns, suggest, as_json)
         return
+    if any(map(is_mined_file, files)):
+        _tell_mined(files, as_json)
+        return
     demonstrations = with_wanted(read_demonstrations(files, env, columns, missing), derived)
     _tell_demonstrations(demonstrations, path_of(files), as_json)
 
@@ -122,6 +131,17 @@ def _suggest_columns(files: list[Path], columns: Columns, out: Path, as_json: bo
         terminal.print_json({"out": str(out), "columns": [one.document for one in previews]})
     else:
         print_suggestion(previews, out)
+
+
+def _tell_mined(files: list[Path], as_json: bool) -> None:
+    from sarl_core.cli.answers.summaries import describe_mined, print_mined
+    from sarl_core.mining.distributed.mined_files import load_mined_data
+
+    document = describe_mined(load_mined_data(files[0]), files[0])
+    if as_json:
+        terminal.print_json(document)
+    else:
+        print_mined(document)
 
 
 def _tell_demonstrations(demonstrations: Demonstrations, path: Path | str, as_json: bool) -> None:

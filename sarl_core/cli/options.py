@@ -241,6 +241,19 @@ _Formulas = Annotated[
         "given several times.",
     ),
 ]
+MINED = ".mined"
+"""How files end that hold what is left of steps mined on a cluster."""
+ClusterAddress = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        metavar="ADDRESS",
+        show_default=False,
+        help="Work on a cluster of Dask: the address of its scheduler, as tcp://scheduler:8786; or "
+        "local:2 for two processes of this machine, local:2:4GB with so much memory each. It needs "
+        "the extra cluster.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
 
 

@@ -8,8 +8,17 @@ from typing import Annotated, Literal
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import pairs_of, path_of, read_demonstrations, with_wanted
+from sarl_core.cli.inputs import (
+    is_mined_file,
+    mine_on,
+    pairs_of,
+    path_of,
+    read_demonstrations,
+    with_wanted,
+)
 from sarl_core.cli.options import (
+    MINED,
+    ClusterAddress,
     Columns,
     Derived,
     Divider,
@@ -23,7 +32,11 @@ from sarl_core.cli.options import (
     with_derived,
     with_environment,
 )
+from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError
+
+_FLOOR = 0.0001
+"""Support down to which trees of a mined file are grown, unless one is given."""
 
 
 @with_environment
@@ -31,16 +44,25 @@ from sarl_core.errors import InputError
 @with_derived
 def mine(
     files: Files,
-    out: Annotated[Path, out_option("The rule file to write.", metavar="RULES.json")],
+    out: Annotated[
+        Path,
+        out_option(
+            "The rule file to write; or, with --cluster, a .mined file, from which rules of any "
+            "thresholds can be mined again without the steps.",
+            metavar="RULES.json",
+        ),
+    ],
     columns: Columns,
     derived: Derived,
     missing: MissingName = "refuse",
+    cluster: ClusterAddress = None,
     support: Annotated[
         float | None,
         typer.Option(
             "--support",
             show_default=False,
-            help="Minimum share of the states a rule applies to.",
+            help="Minimum share of the states a rule applies to. For a .mined file: of any rule "
+            "that it can give; 0.0001 where not given.",
         ),
     ] = None,
     confidence: Annotated[
@@ -117,6 +139,26 @@ def mine(
     Example: `python -m sarl_core mine data/demonstrations/lunar_lander.parquet --support 0.005
     --confidence 0.95 --out rules.json`
     """
+    if cluster is not None or any(map(is_mined_file, [out, *files])):
+        _mine_at_a_distance(
+            files,
+            out,
+            cluster,
+            env,
+            columns,
+            missing,
+            derived,
+            (support, confidence, setting),
+            lift=lift,
+            max_depth=max_depth,
+            divider=divider,
+            hold_out=hold_out,
+            seed=seed,
+            lower_bound=lower_bound,
+            whole="--cross-fit" if cross_fit else "--learner exact" if learner == "exact" else "",
+            as_json=as_json,
+        )
+        return
     terminal.check_output(out, (".json",))
     given = [value is not None for value in (support, confidence, setting)]
     if given not in ([True, True, False], [False, False, True]):
@@ -184,7 +226,8 @@ def mine(
             rule_set = holding_out.with_lower_bound(rule_set, lower_bound)
         if hold_out is not None and split is not None:
             counts = count_rules(rule_set, split.held_out)
-            tried = Tried(hold_out, seed, split, cross_fitting.judge(rule_set, counts), short)
+            judged_on_them = cross_fitting.judge(rule_set, counts)
+            tried = Tried(hold_out, seed, split.mined.n_episodes, judged_on_them, short)
         rule_set.save(out)
     if as_json:
         terminal.print_json(describe_rules(rule_set, out, tried, judged) | oddities)
@@ -192,6 +235,107 @@ def mine(
         print_oddities(oddities)
         print_rules(rule_set, out, tried, judged)
         print_learner(learner, trees)
+
+
+def _mine_at_a_distance(
+    files: list[Path],
+    out: Path,
+    cluster: str | None,
+    env: Environment | None,
+    columns: Columns,
+    missing: Literal["refuse", "drop"],
+    derived: Derived,
+    given: tuple[float | None, float | None, str | None],
+    *,
+    lift: float,
+    max_depth: int | None,
+    divider: int,
+    hold_out: float | None,
+    seed: int,
+    lower_bound: float | None,
+    whole: str,
+    as_json: bool,
+) -> None:
+    """Mine steps that are not here: on a cluster, or from what was left of them."""
+    into_mined = is_mined_file(out)
+    terminal.check_output(out, (".json", MINED))
+    of_mined = any(map(is_mined_file, files))
+    support, confidence, setting = given
+    if whole:
+        raise InputError(
+            f"{whole} needs all steps in one memory; leave it out, or mine without a cluster"
+        )
+    if into_mined and (cluster is None or of_mined):
+        raise InputError(
+            f"{out}: a {MINED} file is made of steps, on a cluster; give these and --cluster, as "
+            "local:2, or write a .json"
+        )
+    named = [value is not None for value in given]
+    if named not in ([True, True, False], [False, False, True]) and not into_mined:
+        raise InputError("give both --support and --confidence, or --setting instead of them")
+    if of_mined and (hold_out is not None or len(files) > 1 or cluster is not None):
+        raise InputError(
+            f"{files[0]}: what is held out, and where, was settled when it was mined; give this "
+            "file alone, with thresholds"
+        )
+    if lower_bound and hold_out is None and not of_mined:
+        raise InputError(
+            "--lower-bound asks what episodes say that a rule was not mined from, and none is held "
+            "out; give --hold-out as well, as --hold-out 0.2"
+        )
+    from sarl_core.cli.answers.summaries import (
+        describe_mined,
+        describe_rules,
+        print_learner,
+        print_mined,
+        print_notes,
+        print_rules,
+    )
+
+    with terminal.working("Mining") as advance:
+        from sarl_core.cli.answers.evidence import Tried
+        from sarl_core.mining.distributed.mined_files import load_mined_data, save_mined_data
+        from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
+        from sarl_core.mining.validation import cross_fitting, holding_out
+
+        pair = (support or 0.0, confidence or 0.0)
+        if setting is not None:
+            pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
+        Thresholds(*pair, lift, max_depth)  # refuse them before a file is read
+        if cluster is None:
+            mined = load_mined_data(files[0])
+        else:
+            from sarl_core.mining.distributed.mining import ClusterPlan
+
+            floor = _FLOOR if into_mined and named == [False] * 3 else pair[0]
+            plan = ClusterPlan(divider, floor, max_depth, hold_out or 0.0, seed)
+            mined = mine_on(cluster, files, env, columns, missing, derived, plan, advance)
+        if into_mined:
+            save_mined_data(mined, out)
+        else:
+            rule_set = mined.mine(
+                supp_min=pair[0], conf_min=pair[1], lift_min=lift, max_depth=max_depth
+            )
+            tried = short = None
+            if mined.held_out:
+                episodes = len(mined.held_out[0].numbers)
+                if lower_bound:
+                    short = holding_out.shortfall(rule_set.rules, lower_bound, episodes)
+                    rule_set = holding_out.with_lower_bound(rule_set, lower_bound)
+                judged = cross_fitting.judge(rule_set, mined.count_rules(rule_set))
+                there = rule_set.source.episodes
+                tried = Tried(mined.share, mined.seed, there, judged, short)
+            rule_set.save(out)
+    notes = list(mined.sample.notes)
+    if into_mined:
+        document = describe_mined(mined, out)
+        terminal.print_json(document) if as_json else print_mined(document)
+    elif as_json:
+        terminal.print_json(describe_rules(rule_set, out, tried) | {"notes": notes})
+    else:
+        print_notes(notes)
+        print_rules(rule_set, out, tried, elsewhere="--hold-out")
+        print_learner("auto", mined.trees)
 
 
 @with_environment
@@ -240,16 +384,23 @@ def landscape(
         from sarl_core.mining.thresholds.landscape import threshold_landscape
 
         grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
-        recorded = read_demonstrations(files, env, columns, missing)
-        recorded = with_wanted(recorded, derived, divider=divider)
-        trees = grow_policy_trees(recorded, divider=divider, learner=learner)
+        if any(map(is_mined_file, files)):
+            from sarl_core.mining.distributed.mined_files import load_mined_data
+
+            mined = load_mined_data(files[0])
+            trees, notes = mined.trees, mined.notes
+        else:
+            recorded = read_demonstrations(files, env, columns, missing)
+            recorded = with_wanted(recorded, derived, divider=divider)
+            trees = grow_policy_trees(recorded, divider=divider, learner=learner)
+            notes = recorded.notes
         plane = threshold_landscape(trees, *grid)
         names = [tree.dimension.name for tree in trees]
         source = trees[0].source
         title = f"{source.env_id or path_of(files, short=True)}: {source.steps:,} steps"
         save_landscape(plane, names, out, title=title)
     if as_json:
-        terminal.print_json({**landscape_document(plane, names), "notes": list(recorded.notes)})
+        terminal.print_json({**landscape_document(plane, names), "notes": list(notes)})
         return
     from sarl_core.cli.answers.summaries import print_learner, print_notes
 
@@ -262,4 +413,4 @@ def landscape(
         ]
     )
     print_learner(learner, trees)
-    print_notes(recorded.notes)
+    print_notes(notes)

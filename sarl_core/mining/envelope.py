@@ -66,7 +66,7 @@ def with_splits(rule_set: RuleSet, demonstrations: Demonstrations) -> RuleSet:
     splits = splits_of(
         np.array([feature for feature, _, _ in conditions], dtype=np.int64),
         np.array([threshold for _, _, threshold in conditions], dtype=np.float64),
-        demonstrations,
+        demonstrations.observations,
     )
     known = [feature.splits for feature in rule_set.source.features]
     return replace(

@@ -98,14 +98,17 @@ class PolicyTree:
         parent: Node number of the parent, (n,) int64, -1 at the root.
         depth: Number of queries above each node, (n,) int64.
         counts: Demonstrated pairs of each label at each node, (n, labels) int64.
-        sample_order: Row numbers of the demonstrations, sorted by leaf, (N,) int64.
-        sample_start: Where each node's rows begin in `sample_order`, (n,) int64.
-        demonstrated: Action of each row in this dimension, (N,); what a projection may use.
+        sample_order: Row numbers of the demonstrations, sorted by leaf, (N,) int64; or, where far
+            more pairs were counted than anybody holds, of those that are held, (M,).
+        sample_start: Where each node's pairs begin, were all of them sorted by leaf, (n,) int64.
+        demonstrated: Action of each row in this dimension, (N,) or (M,); what a projection may use.
         label: What a rule cut at each node says, (n,) int64: the most frequent label, the lowest
             where several are, unless the tree was improved by what it achieves.
         number: What stands in the id of a rule cut at each node, (n,) int64: its place, unless a
             part of the tree was regrown; the other nodes then keep theirs.
         learner: What chose its queries.
+        sample_place: Where the pairs of the row's leaf begin, for each row of `sample_order`, (M,)
+            int64, ascending; None where that holds all pairs.
     """
 
     index: int
@@ -125,6 +128,7 @@ class PolicyTree:
     label: NDArray[np.int64]
     number: NDArray[np.int64]
     learner: Learner = "exact"
+    sample_place: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -225,10 +229,13 @@ class PolicyTree:
             node: Node number.
 
         Returns:
-            Row numbers, shape (samples[node],).
+            Row numbers, shape (samples[node],); of the rows that are held, where those are some.
         """
         start = int(self.sample_start[node])
-        return self.sample_order[start : start + int(self.samples[node])]
+        end = start + int(self.samples[node])
+        if self.sample_place is not None:
+            start, end = np.searchsorted(self.sample_place, [start, end]).tolist()
+        return self.sample_order[start:end]
 
     def apply(self, observations: NDArray[np.float32]) -> NDArray[np.int64]:
         """The leaf that each state reaches.
@@ -259,19 +266,18 @@ def source_of(trees: Sequence[PolicyTree]) -> Source:
 
 
 def splits_of(
-    feature: NDArray[np.int64], threshold: NDArray[np.float64], demonstrations: Demonstrations
+    feature: NDArray[np.int64], threshold: NDArray[np.float64], states: NDArray[np.float32]
 ) -> list[Splits | None]:
     """What demonstrations tell of thresholds.
 
     Args:
         feature: Feature that each is asked of, (k,); `LEAF` where nothing is asked.
         threshold: Shape (k,).
-        demonstrations: N states.
+        states: That were demonstrated, (N, d).
 
     Returns:
         One entry a feature; None where it is not asked.
     """
-    states = demonstrations.observations
     is_used = np.isin(np.arange(states.shape[1]), feature)
     return [
         Splits.of(states[:, index], threshold[feature == index]) if is_used[index] else None

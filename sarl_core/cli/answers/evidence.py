@@ -19,7 +19,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_core.mining.validation.episode_counts import Influence
-from sarl_core.mining.validation.holding_out import Shortfall, Split, best_lower_bound
+from sarl_core.mining.validation.holding_out import Shortfall, best_lower_bound
 
 
 class Tried(NamedTuple):
@@ -28,7 +28,7 @@ class Tried(NamedTuple):
     Attributes:
         share: Of the episodes, held out.
         seed: That drew them.
-        split: Both parts.
+        mined: Episodes that it was mined from.
         judged: The rule set on those held out.
         short: Of all rules there were, before those below a lower bound were dropped; None where
             there is no such bound.
@@ -36,14 +36,14 @@ class Tried(NamedTuple):
 
     share: float
     seed: int
-    split: Split
+    mined: int
     judged: Judged
     short: Shortfall | None = None
 
     @property
     def there(self) -> int:
         """Episodes in all."""
-        return self.split.mined.n_episodes + self.split.held_out.n_episodes
+        return self.mined + len(self.judged.numbers)
 
 
 def describe_tried(rule_set: RuleSet, tried: Tried) -> dict[str, Any]:
@@ -61,8 +61,8 @@ def describe_tried(rule_set: RuleSet, tried: Tried) -> dict[str, Any]:
     return {
         "share": tried.share,
         "seed": tried.seed,
-        "episodes": sorted(set(tried.split.held_out.episodes.tolist())),
-        "steps": len(tried.split.held_out),
+        "episodes": sorted(tried.judged.numbers.tolist()),
+        "steps": int(tried.judged.lengths.sum()),
         "samples": fidelity.samples,
         "correct": fidelity.correct,
         "fidelity": fidelity.share,
@@ -136,12 +136,12 @@ def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
     Returns:
         To be printed below the other facts.
     """
-    held = tried.split.held_out
+    judged = tried.judged
     facts = [
         (
             "held out",
-            f"{counted(held.n_episodes, 'episode')} of {tried.there:,}, "
-            f"{counted(len(held), 'state')} (seed {tried.seed})",
+            f"{counted(len(judged.numbers), 'episode')} of {tried.there:,}, "
+            f"{counted(int(judged.lengths.sum()), 'state')} (seed {tried.seed})",
         )
     ]
     facts += _facts(tried.judged, "these")

@@ -66,18 +66,62 @@ def count_tree(
         InputError: If the divider is out of range.
     """
     dimension = label_dimensions(demonstrations, divider)[index]
-    demonstrated = demonstrations.action_columns[:, index].copy()
-    labels = dimension.labels_of(demonstrated)
+    labels = dimension.labels_of(demonstrations.action_columns[:, index])
+    leaves = structure.apply(demonstrations.observations)
+    # Counted here, since scikit-learn keeps fractions and the positions of the labels it saw.
+    n = len(structure.feature)
+    counts = np.bincount(
+        leaves * dimension.n_labels + labels, minlength=n * dimension.n_labels
+    ).reshape(n, dimension.n_labels)
+    splits = splits_of(structure.feature, structure.threshold, demonstrations.observations)
+    return tree_of_counts(
+        structure,
+        counts,
+        demonstrations,
+        leaves,
+        index,
+        divider=divider,
+        learner=learner,
+        source=Source.of(demonstrations).with_splits(splits),
+    )
+
+
+def tree_of_counts(
+    structure: TreeStructure,
+    counts: NDArray[np.int64],
+    demonstrations: Demonstrations,
+    leaves: NDArray[np.int64],
+    index: int,
+    *,
+    divider: int,
+    learner: Learner,
+    source: Source,
+) -> PolicyTree:
+    """Put together a tree whose leaves are counted.
+
+    Args:
+        structure: Its queries.
+        counts: Pairs of each label at each leaf, and 0 at other nodes, (n, labels).
+        demonstrations: These pairs; or some of them, where there are far more.
+        leaves: The leaf that each of those reaches, (N,).
+        index: Which action dimension.
+        divider: Number of intervals of continuous dimensions.
+        learner: What chose the queries.
+        source: What was counted.
+
+    Returns:
+        The tree.
+
+    Raises:
+        InputError: If the divider is out of range.
+    """
+    dimension = label_dimensions(demonstrations, divider)[index]
     left, right = structure.children_left, structure.children_right
     levels = tree_levels(left, right)
     n = len(left)
     parent = np.full(n, -1, dtype=np.int64)
     depth = np.zeros(n, dtype=np.int64)
-    leaves = structure.apply(demonstrations.observations)
-    # Counted here, since scikit-learn keeps fractions and the positions of the labels it saw.
-    counts = np.bincount(
-        leaves * dimension.n_labels + labels, minlength=n * dimension.n_labels
-    ).reshape(n, dimension.n_labels)
+    counts = counts.astype(np.int64)
     for number, level in enumerate(levels):
         depth[level] = number
         inner = level[left[level] != LEAF]
@@ -93,24 +137,24 @@ def count_tree(
         inner = level[left[level] != LEAF]
         start[left[inner]] = start[inner]
         start[right[inner]] = start[inner] + samples[left[inner]]
+    # Stable, so that the rows of a leaf keep their order in time.
+    order = np.argsort(start[leaves], kind="stable").astype(np.int64)
     return PolicyTree(
         index=index,
         dimension=dimension,
         divider=int(divider),
-        source=Source.of(demonstrations).with_splits(
-            splits_of(structure.feature, structure.threshold, demonstrations)
-        ),
+        source=source,
         feature=structure.feature,
         threshold=structure.threshold,
         children_left=left,
         children_right=right,
         parent=parent,
         depth=depth,
-        counts=counts.astype(np.int64),
-        # Stable, so that the rows of a leaf keep their order in time.
-        sample_order=np.argsort(start[leaves], kind="stable").astype(np.int64),
+        counts=counts,
+        sample_order=order,
         sample_start=start,
-        demonstrated=demonstrated,
+        sample_place=None if len(leaves) == samples[0] else start[leaves][order],
+        demonstrated=demonstrations.action_columns[:, index].copy(),
         label=(
             frequent
             if structure.label is None

@@ -61,7 +61,8 @@ def count_applied(
     """
     each = np.ones(len(row), dtype=np.int64)
     episode = episode_of_each(demonstrations)[row]
-    return _counted(size, subject, episode, each, right.astype(np.int64), demonstrations)
+    numbers, lengths = _episodes_of(demonstrations)
+    return _counted(size, subject, episode, each, right.astype(np.int64), numbers, lengths)
 
 
 def count_nodes(tree: PolicyTree, demonstrations: Demonstrations) -> EpisodeCounts:
@@ -81,15 +82,49 @@ def count_nodes(tree: PolicyTree, demonstrations: Demonstrations) -> EpisodeCoun
     key = (leaf * episodes + episode_of_each(demonstrations)) * n_labels + label
     key, samples = np.unique(key, return_counts=True)
     above, label = np.divmod(key, n_labels)
-    node, episode = np.divmod(above, episodes)
+    leaf, episode = np.divmod(above, episodes)
+    return count_above(tree, leaf, episode, label, samples, *_episodes_of(demonstrations))
+
+
+def count_above(
+    tree: PolicyTree,
+    leaf: Integers,
+    episode: Integers,
+    label: Integers,
+    samples: Integers,
+    numbers: Integers,
+    lengths: Integers,
+) -> EpisodeCounts:
+    """What was counted at leaves, at every node above them.
+
+    Args:
+        tree: With n nodes.
+        leaf: Node number, (K,).
+        episode: In which episode, 0 to E - 1, (K,).
+        label: Which label, (K,).
+        samples: Pairs of these three, (K,).
+        numbers: What the episodes are called, (E,).
+        lengths: Their steps, (E,).
+
+    Returns:
+        The counts, by node number.
+    """
+    node = leaf
     parts: list[tuple[Integers, ...]] = []
     while len(node):
         parts.append((node, episode, samples, samples * (tree.label[node] == label)))
         inner = tree.parent[node] >= 0
         node, episode = tree.parent[node[inner]], episode[inner]
         samples, label = samples[inner], label[inner]
-    columns = [np.concatenate(part) for part in zip(*parts, strict=True)]
-    return _counted(tree.n_nodes, columns[0], columns[1], columns[2], columns[3], demonstrations)
+    none = np.zeros((4, 0), dtype=np.int64)
+    columns = [np.concatenate(part) for part in zip(*parts, strict=True)] if parts else none
+    return _counted(tree.n_nodes, columns[0], columns[1], columns[2], columns[3], numbers, lengths)
+
+
+def _episodes_of(demonstrations: Demonstrations) -> tuple[Integers, Integers]:
+    """What episodes are called, and their steps."""
+    starts = demonstrations.episode_starts
+    return demonstrations.episodes[starts], demonstrations.episode_lengths
 
 
 def _counted(
@@ -98,26 +133,19 @@ def _counted(
     episode: Integers,
     samples: Integers,
     correct: Integers,
-    demonstrations: Demonstrations,
+    numbers: Integers,
+    lengths: Integers,
 ) -> EpisodeCounts:
     """Add up what belongs to one subject and one episode."""
-    key = subject * demonstrations.n_episodes + episode
+    key = subject * len(numbers) + episode
     order = np.argsort(key, kind="stable")
     key = key[order]
     first = np.flatnonzero(np.diff(key, prepend=-1))
     if len(first):
         samples = np.add.reduceat(samples[order], first)
         correct = np.add.reduceat(correct[order], first)
-    subject, episode = np.divmod(key[first], demonstrations.n_episodes)
-    return EpisodeCounts(
-        size,
-        subject,
-        episode,
-        samples,
-        correct,
-        numbers=demonstrations.episodes[demonstrations.episode_starts],
-        lengths=demonstrations.episode_lengths,
-    )
+    subject, episode = np.divmod(key[first], len(numbers))
+    return EpisodeCounts(size, subject, episode, samples, correct, numbers, lengths)
 
 
 # --- an episode that alone moves a number --------------------------------------------------------

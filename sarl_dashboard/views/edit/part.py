@@ -249,7 +249,7 @@ def _query_texts(
     """In signs, with as many digits as tell the demonstrated states apart as the queries do."""
     feature = np.array([query.feature for query in queries], dtype=np.int64)
     threshold = np.array([query.threshold for query in queries])
-    source = tree.source.with_splits(splits_of(feature, threshold, demonstrations))
+    source = tree.source.with_splits(splits_of(feature, threshold, demonstrations.observations))
     return [
         query_text(Condition(query.feature, "<=", query.threshold), source.features)
         for query in queries

@@ -1,0 +1,115 @@
+"""A cluster of Dask: connecting to one that runs, or starting one on this machine.
+
+Its processes are one more kind of `concurrent.futures.Executor`; whoever has more data than memory
+also uses the client itself, which keeps what was worked out where it was worked out.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from sarl_core.errors import InputError, WorkError, needing_extras, quoted
+
+_LOCAL = re.compile(r"local:(?P<workers>\d{1,3})(?::(?P<memory>\d+(?:\.\d+)?\s*[kMGT]i?B))?")
+_SECONDS = 10  # to wait for a scheduler, and for its first worker
+
+
+@contextmanager
+def cluster(address: str) -> Iterator[Any]:
+    """A client of a cluster, closed at the end; one on this machine ends with it.
+
+    Args:
+        address: Of a scheduler, as "tcp://scheduler:8786"; or "local:2" for two processes of this
+            machine, "local:2:4GB" with so much memory each.
+
+    Yields:
+        A ``distributed.Client``.
+
+    Raises:
+        InputError: If the address is none, the scheduler cannot be reached, or its workers lack
+            this package or have another version of it.
+        WorkError: If the extra "cluster" is not installed.
+    """
+    with needing_extras():
+        from distributed import Client, LocalCluster
+    local = _LOCAL.fullmatch(address)
+    if local is None and "://" not in address:
+        raise InputError(
+            f"{quoted(address)} is no cluster; give the address of a scheduler, as "
+            "tcp://scheduler:8786, or local:2 for two processes of this machine"
+        )
+    if local is not None and not int(local["workers"]):
+        raise InputError(f"{quoted(address)} has no process; give one or more, as local:2")
+    # What the processes of a cluster say of themselves is not for whoever waits for rules.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    if local is not None:
+        started = LocalCluster(
+            n_workers=int(local["workers"]),
+            threads_per_worker=1,
+            memory_limit=local["memory"] or "auto",
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        )
+        with started, Client(started) as client:
+            yield client
+        return
+    try:
+        client = Client(address, timeout=_SECONDS)
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"no scheduler answers at {quoted(address)}; check the address, and that it runs"
+        ) from error
+    with client:
+        _require_same_package(client, address)
+        yield client
+
+
+def _require_same_package(client: Any, address: str) -> None:
+    """Refuse a cluster that would work differently, or not at all."""
+    try:
+        client.wait_for_workers(1, timeout=_SECONDS)
+    except TimeoutError as error:
+        raise InputError(
+            f"the scheduler at {quoted(address)} has no worker; start some: dask worker {address}"
+        ) from error
+
+    def version() -> str:  # sent as it stands: whoever lacks the package could not look it up
+        try:
+            import sarl_core
+        except ImportError:
+            return ""
+        return sarl_core.__version__
+
+    own = version()
+    for worker, other in client.run(version).items():
+        if not other:
+            raise InputError(
+                f"the worker {worker} lacks this package; install version {own} of it there"
+            )
+        if other != own:
+            raise InputError(
+                f"the worker {worker} has version {other} of this package, and here is {own}; "
+                "install the same one"
+            )
+
+
+@contextmanager
+def saying_losses() -> Iterator[None]:
+    """Turn what a cluster raises when it cannot go on into one sentence."""
+    from distributed import CancelledError as Cancelled
+    from distributed import KilledWorker
+    from distributed.comm.core import CommClosedError
+
+    try:
+        yield
+    except KilledWorker as error:
+        raise WorkError(
+            "several workers ended over the same piece of work, as when memory runs out; give them "
+            "more memory, or write smaller row groups"
+        ) from error
+    except (CommClosedError, Cancelled) as error:
+        raise WorkError("the cluster ended in the middle of the work; run again") from error

@@ -1,0 +1,1 @@
+"""Mining rows that no single memory holds, on a cluster of Dask."""

@@ -1,0 +1,208 @@
+"""What is left of rows that nobody holds: trees, what was counted at their nodes, a sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.evidence import DataBox, EpisodeCounts, HeldOut
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule
+from sarl_core.mining.tree import PolicyTree
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureHistogram:
+    """How often a feature took which values.
+
+    Attributes:
+        borders: Between two bins, ascending, (k,): a value is in bin 0 where it is at most the
+            first.
+        counts: Pairs in each bin, (k + 1,) int64.
+    """
+
+    borders: Floats
+    counts: NDArray[np.int64]
+
+    def quantile(self, share: float) -> float:
+        """A border that about so many pairs do not exceed.
+
+        Args:
+            share: From 0 to 1.
+
+        Returns:
+            The first border that at least so many do not exceed; NaN where all pairs are in one
+            bin.
+        """
+        if not len(self.borders):
+            return float("nan")
+        most = np.searchsorted(self.counts.cumsum(), share * self.counts.sum())
+        return float(self.borders[min(int(most), len(self.borders) - 1)])
+
+
+@dataclass(frozen=True, eq=False)
+class MinedData:
+    """Trees over N pairs, and what was counted of all of these.
+
+    Attributes:
+        trees: One an action dimension; their rows are those of the sample.
+        sample: M of the N pairs.
+        boxes: For each tree what `DataBox` has, at each of its n nodes, (4, n, d): the outer two
+            of all pairs, the inner two of some hundred thousand; NaN where there is no pair.
+        histograms: Of each feature, of all pairs.
+        held_out: For each tree, what was counted at its nodes in episodes that were held out; ()
+            where none were.
+        share: Of the episodes that was to be held out.
+        seed: By which they were drawn.
+        min_support: No node with less was split further.
+    """
+
+    trees: tuple[PolicyTree, ...]
+    sample: Demonstrations
+    boxes: tuple[Floats, ...]
+    histograms: tuple[FeatureHistogram, ...]
+    held_out: tuple[EpisodeCounts, ...] = ()
+    share: float = 0.0
+    seed: int = 0
+    min_support: float = 0.0
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on how the steps were read, and how far the trees go."""
+        if not self.min_support:
+            return self.sample.notes
+        return (
+            *self.sample.notes,
+            f"these trees were grown down to a support of {self.min_support:g}: rules with less "
+            "are not among them",
+        )
+
+    @property
+    def divider(self) -> int:
+        """Number of intervals of continuous dimensions."""
+        return self.trees[0].divider
+
+    @cached_property
+    def _of_nodes(self) -> tuple[list[HeldOut], ...]:
+        return tuple(counts.held_out() for counts in self.held_out)
+
+    def mine(
+        self,
+        *,
+        supp_min: float,
+        conf_min: float,
+        lift_min: float = 0.0,
+        max_depth: int | None = None,
+    ) -> RuleSet:
+        """Mine a rule set, as `mine_rules`, with data boxes and held-out episodes.
+
+        Args:
+            supp_min: Minimum support of a rule, 0 to 1.
+            conf_min: Minimum confidence, 0 to 1.
+            lift_min: Minimum lift, 0 or more.
+            max_depth: Longest rule, in queries.
+
+        Returns:
+            The rules.
+
+        Raises:
+            InputError: If a threshold is out of range, or the trees were not grown down to the
+                support.
+        """
+        if 0.0 <= supp_min < self.min_support:
+            raise InputError(
+                f"the minimum support is {supp_min:g}, and these trees were grown down to "
+                f"{self.min_support:g}; give that or more, or mine the steps again with less"
+            )
+        rules = mine_rules(
+            self.trees,
+            supp_min=supp_min,
+            conf_min=conf_min,
+            lift_min=lift_min,
+            max_depth=max_depth,
+        )
+        return replace(rules, rules=tuple(map(self._completed, rules.rules)))
+
+    def count_rules(self, rule_set: RuleSet) -> EpisodeCounts:
+        """What was counted of rules in the episodes that were held out.
+
+        Args:
+            rule_set: Of `mine`, or some rules of one.
+
+        Returns:
+            The counts, a rule's place in the set being its number.
+        """
+        first = self.held_out[0]
+        columns: list[NDArray[np.int64]] = []
+        for number, rule in enumerate(rule_set.rules):
+            counts = self.held_out[rule.dimension]
+            ends = np.searchsorted(counts.subject, [node_of(rule), node_of(rule) + 1])
+            of = slice(*ends.tolist())
+            episode = counts.episode[of]
+            columns.append(
+                np.stack(
+                    [np.full_like(episode, number), episode, counts.samples[of], counts.correct[of]]
+                )
+            )
+        whole = np.concatenate(columns, axis=1) if columns else np.zeros((4, 0), dtype=np.int64)
+        place, episode, samples, correct = whole
+        return EpisodeCounts(
+            len(rule_set.rules), place, episode, samples, correct, first.numbers, first.lengths
+        )
+
+    def _completed(self, rule: Rule) -> Rule:
+        node = node_of(rule)
+        sides = self.boxes[rule.dimension][:, node]
+        box = None if np.isnan(sides).any() else DataBox(*sides.tolist())
+        held = self._of_nodes[rule.dimension][node] if self.held_out else None
+        return replace(rule, box=box, held_out=held)
+
+
+def node_of(rule: Rule) -> int:
+    """The node that a mined rule was cut at; nothing was regrown, so its number is its place."""
+    return int(rule.id.rpartition(".")[2])
+
+
+def boxes_of(
+    tree: PolicyTree,
+    least: NDArray[np.float32],
+    most: NDArray[np.float32],
+    states: NDArray[np.float32],
+    quantiles: Sequence[float],
+) -> Floats:
+    """The data boxes at all nodes of a tree.
+
+    Args:
+        tree: With n nodes.
+        least: Least value of each feature at each node, (n, d).
+        most: Largest, likewise.
+        states: A sample of the pairs, (M, d).
+        quantiles: The two that stand within.
+
+    Returns:
+        Shape (4, n, d); NaN at nodes without a pair.
+    """
+    largest = np.finfo(np.float32).max
+    boxes = np.empty((4, *least.shape))
+    boxes[0], boxes[3] = np.clip(least, -largest, largest), np.clip(most, -largest, largest)
+    boxes[:, tree.samples == 0] = np.nan
+    boxes[1], boxes[2] = boxes[0], boxes[3]
+    leaves = tree.apply(states)
+    start = tree.sample_start[leaves]
+    order = np.argsort(start, kind="stable")
+    begins, ordered = start[order], np.clip(states[order], -largest, largest)
+    first = np.searchsorted(begins, tree.sample_start)
+    last = np.searchsorted(begins, tree.sample_start + tree.samples)
+    for node in np.flatnonzero((last > first) & (tree.samples > 0)).tolist():
+        inner = np.quantile(ordered[first[node] : last[node]].astype(np.float64), quantiles, axis=0)
+        boxes[1:3, node] = np.clip(inner, boxes[0, node], boxes[3, node])
+    return boxes

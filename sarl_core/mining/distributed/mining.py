@@ -1,0 +1,295 @@
+"""Mining Parquet files on a cluster: three passes over their rows, and what is left of them."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.clusters import saying_losses
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError
+from sarl_core.mining.combining.candidates import Pair
+from sarl_core.mining.combining.choice import with_combinations
+from sarl_core.mining.distributed.binning import bin_counts, bin_piece, label_counts
+from sarl_core.mining.distributed.counting import TreeCounts, at_nodes, count_piece, together
+from sarl_core.mining.distributed.growth import DistributedGrowth, added_up
+from sarl_core.mining.distributed.mined_data import FeatureHistogram, MinedData, boxes_of
+from sarl_core.mining.distributed.pieces import Piece, Reading, pieces_of, some_rows
+from sarl_core.mining.distributed.survey import (
+    Layout,
+    columns_of_head,
+    episode_keys,
+    layout_of,
+    row_keys,
+    survey_piece,
+)
+from sarl_core.mining.envelope import HIGH_QUANTILE, LOW_QUANTILE
+from sarl_core.mining.evidence import EpisodeCounts
+from sarl_core.mining.growing.histogram import BinnedStates
+from sarl_core.mining.growing.structure import TreeStructure, tree_levels, tree_of_counts
+from sarl_core.mining.labels import label_dimensions
+from sarl_core.mining.tree import PolicyTree, Source
+from sarl_core.mining.validation.episode_counts import count_above
+from sarl_core.progress import Progress, report
+
+SAMPLE_ROWS = 2**19
+"""Rows by which bins and the inner sides of boxes are chosen, about; of fewer all are."""
+HELD_ROWS = 50_000
+"""Rows of the sample that is kept, about."""
+MOST_HELD_OUT = 2_000
+"""Episodes that are held out at most: more would say nothing that these do not."""
+_STEPS = 1_000  # of the progress
+
+
+@dataclass(frozen=True)
+class ClusterPlan:
+    """What is to be mined.
+
+    Attributes:
+        divider: Number of intervals of continuous dimensions.
+        min_support: No node with less is split further.
+        max_depth: Of the trees; None for no limit.
+        hold_out: Share of the episodes to hold out; 0 for none.
+        seed: Draws these, and chooses among equally good queries.
+    """
+
+    divider: int = 2
+    min_support: float = 0.0
+    max_depth: int | None = None
+    hold_out: float = 0.0
+    seed: int = 0
+
+
+def mine_on_cluster(
+    client: Any,
+    paths: Sequence[Path],
+    reading: Reading,
+    plan: ClusterPlan,
+    *,
+    pairs_of: Callable[[Demonstrations], tuple[Pair, ...]] | None = None,
+    progress: Progress | None = None,
+) -> MinedData:
+    """Mine Parquet files that no single memory holds.
+
+    The same files, or the same rows cut into others, give the same trees, however many workers
+    there are.
+
+    Args:
+        client: Of a cluster whose workers can open the files; a ``distributed.Client``.
+        paths: The files.
+        reading: How they are read.
+        plan: What is to be mined.
+        pairs_of: Says of a sample which features may be combined; None for none.
+        progress: Told how far it is; may stop it.
+
+    Returns:
+        The trees, and what was counted.
+
+    Raises:
+        InputError: If a file cannot be read, or is wrong.
+        WorkError: If the cluster cannot go on.
+        CancelledError: If the caller wants no more.
+    """
+
+    def told(share: float) -> None:
+        report(progress, round(share * _STEPS), _STEPS)
+
+    pieces = pieces_of(paths)
+    with saying_losses():
+        told(0.0)
+        layout, reading = _surveyed(client, pieces, reading, lambda share: told(0.2 * share))
+        held_out = _held_out(layout, plan)
+        mined = layout.sample
+        if len(held_out):
+            mined = _without(layout.sample, held_out)
+        if pairs_of is not None:
+            mined = with_combinations(mined, pairs=pairs_of(mined), divider=plan.divider)
+            layout = replace(layout, sample=layout.sample.deriving(mined.derived))
+        placement = layout.placement(held_out)
+        borders = BinnedStates.of(mined.observations).borders
+        rows = _persisted(
+            client,
+            [
+                client.submit(bin_piece, piece, reading, placement, borders, plan.divider)
+                for piece in pieces
+            ],
+            lambda share: told(0.2 + 0.2 * share),
+        )
+        dimensions = label_dimensions(mined, plan.divider)
+        most = max(one.n_labels for one in dimensions)
+        labels = added_up(client, [client.submit(label_counts, one, most) for one in rows]).result()
+        bins = max(map(len, borders)) + 1
+        counted = added_up(client, [client.submit(bin_counts, one, bins) for one in rows])
+        steps = int(labels[0].sum())
+        structures = []
+        for index, dimension in enumerate(dimensions):
+            growth = DistributedGrowth(
+                client,
+                rows,
+                labels[index, : dimension.n_labels],
+                bins,
+                len(borders),
+                dimension=index,
+                least=math.ceil(plan.min_support * steps),
+                max_depth=plan.max_depth,
+                seed=plan.seed,
+                told=lambda share, index=index: told(  # type: ignore[misc]
+                    0.4 + 0.4 * (index + share) / len(dimensions)
+                ),
+            )
+            structures.append(_of_values(growth.grow(), borders))
+        in_bins = counted.result()
+        del rows, counted
+        total = added_up(
+            client,
+            _persisted(
+                client,
+                [
+                    client.submit(count_piece, piece, reading, placement, structures, plan.divider)
+                    for piece in pieces
+                ],
+                lambda share: told(0.8 + 0.2 * share),
+            ),
+            together,
+        ).result()
+        told(1.0)
+    return _mined(layout, mined, held_out, structures, total, borders, in_bins, plan)
+
+
+def _surveyed(
+    client: Any, pieces: Sequence[Piece], reading: Reading, told: Callable[[float], None]
+) -> tuple[Layout, Reading]:
+    """The first pass. How the first piece is understood, all others are read."""
+    share = min(1.0, SAMPLE_ROWS / sum(piece.rows for piece in pieces))
+    first = client.submit(survey_piece, pieces[0], reading, share).result()
+    if reading.columns is None:
+        reading = replace(reading, columns=columns_of_head(first.head))
+    futures = [client.submit(survey_piece, piece, reading, share) for piece in pieces[1:]]
+    surveys = [first, *(one.result() for one in _persisted(client, futures, told))]
+    return layout_of(pieces, surveys), reading
+
+
+def _persisted(client: Any, futures: Sequence[Any], told: Callable[[float], None]) -> Sequence[Any]:
+    """Wait until all are worked out, where they are, and say how far it is."""
+    from distributed import as_completed
+
+    waiting = as_completed(futures)
+    for done, future in enumerate(waiting, start=1):
+        if future.status == "error":
+            future.result()  # raises
+        told(done / len(futures))
+    return futures
+
+
+def _held_out(layout: Layout, plan: ClusterPlan) -> NDArray[np.int64]:
+    """The episodes that are held out, drawn by their own numbers."""
+    if not plan.hold_out:
+        return np.zeros(0, dtype=np.int64)
+    episodes = layout.episodes
+    if len(episodes) < 2:
+        raise InputError(
+            "there is one episode, and holding it out leaves none to mine from; leave --hold-out "
+            "out, or give more episodes"
+        )
+    keys = episode_keys(episodes + plan.seed * 1_000_003)
+    count = min(max(round(plan.hold_out * len(episodes)), 1), len(episodes) - 1, MOST_HELD_OUT)
+    return np.sort(episodes[np.argsort(keys, kind="stable")[:count]])
+
+
+def _without(sample: Demonstrations, held_out: NDArray[np.int64]) -> Demonstrations:
+    rows = ~np.isin(sample.episodes, held_out)
+    return some_rows(sample, rows)
+
+
+def _of_values(structure: TreeStructure, borders: Sequence[NDArray[np.float64]]) -> TreeStructure:
+    """The same tree, asking of values what it asks of bins."""
+    threshold = np.zeros(len(structure.feature))
+    for feature, own in enumerate(borders):
+        here = structure.feature == feature
+        threshold[here] = own[structure.threshold[here].astype(np.int64)]
+    return replace(structure, threshold=threshold)
+
+
+def _mined(
+    layout: Layout,
+    mined: Demonstrations,
+    held_out: NDArray[np.int64],
+    structures: Sequence[TreeStructure],
+    counted: Sequence[TreeCounts],
+    borders: Sequence[NDArray[np.float64]],
+    in_bins: NDArray[np.int64],
+    plan: ClusterPlan,
+) -> MinedData:
+    kept = _some(mined)
+    steps = int(counted[0].counts.sum())
+    episodes = len(layout.episodes) - len(held_out)
+    digest = layout.digest
+    if len(held_out):
+        digest = hashlib.blake2b(digest.encode() + held_out.tobytes(), digest_size=16).hexdigest()
+    source = Source(mined.env_id, mined.features, digest, steps, episodes)
+    trees: list[PolicyTree] = []
+    boxes = []
+    for index, (structure, counts) in enumerate(zip(structures, counted, strict=True)):
+        tree = tree_of_counts(
+            structure,
+            counts.counts,
+            kept,
+            structure.apply(kept.observations),
+            index,
+            divider=plan.divider,
+            learner="histogram",
+            source=source.with_splits(counts.splits),
+        )
+        levels = tree_levels(structure.children_left, structure.children_right)
+        boxes.append(
+            boxes_of(
+                tree,
+                at_nodes(structure, counts.least, np.minimum, levels),
+                at_nodes(structure, counts.most, np.maximum, levels),
+                mined.observations,
+                (LOW_QUANTILE, HIGH_QUANTILE),
+            )
+        )
+        trees.append(tree)
+    return MinedData(
+        tuple(trees),
+        kept,
+        tuple(boxes),
+        tuple(
+            FeatureHistogram(own, in_bins[feature, : len(own) + 1])
+            for feature, own in enumerate(borders)
+        ),
+        tuple(
+            _episode_counts(tree, counts.held_out, held_out)
+            for tree, counts in zip(trees, counted, strict=True)
+        )
+        if len(held_out)
+        else (),
+        plan.hold_out,
+        plan.seed,
+        plan.min_support,
+    )
+
+
+def _some(mined: Demonstrations) -> Demonstrations:
+    """Those of the sample that are kept, by their keys: the same ones every time."""
+    if len(mined) <= HELD_ROWS:
+        return mined
+    keys = row_keys(mined)
+    return some_rows(mined, keys <= np.partition(keys, HELD_ROWS - 1)[HELD_ROWS - 1])
+
+
+def _episode_counts(
+    tree: PolicyTree, held_out: NDArray[np.int64], numbers: NDArray[np.int64]
+) -> EpisodeCounts:
+    above, label = np.divmod(held_out[0], tree.dimension.n_labels)
+    leaf, episode = np.divmod(above, len(numbers))
+    lengths = np.bincount(episode, held_out[1], minlength=len(numbers)).astype(np.int64)
+    return count_above(tree, leaf, episode, label, held_out[1], numbers, lengths)

@@ -1,0 +1,292 @@
+"""Parquet files in pieces: some row groups of one file each, which one process reads at once."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations, Feature, with_formulas
+from sarl_core.demonstrations.formats.arrow.parquet_file import is_text, refusing_damage
+from sarl_core.demonstrations.formats.arrow.table import arrow_table
+from sarl_core.demonstrations.formats.columns import ColumnMap
+from sarl_core.demonstrations.formats.mapping.roles import ROLE_WORDS, Roles
+from sarl_core.demonstrations.formats.missing import Missing
+from sarl_core.demonstrations.formats.naming import naming
+from sarl_core.demonstrations.formats.recording import to_demonstrations
+from sarl_core.demonstrations.formats.sets.file_set import files_in_folder, natural_order
+from sarl_core.demonstrations.formats.tables import recording_from_table
+from sarl_core.demonstrations.recoding import recoded
+from sarl_core.environments.description import EnvironmentDescription
+from sarl_core.errors import InputError, quoted
+from sarl_core.limits import require_memory, table_memory
+
+ROWS = 400_000
+"""Of a piece, unless one row group has more."""
+_ENDING = ".parquet"
+_PATTERN = frozenset("*?[")
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Some row groups of a file.
+
+    Attributes:
+        path: Of the file, from the root.
+        file: Its place among the files.
+        first: Number of the first row group.
+        groups: How many there are.
+        rows: In them.
+    """
+
+    path: str
+    file: int
+    first: int
+    groups: int
+    rows: int
+
+    @property
+    def name(self) -> str:
+        """As sentences call it."""
+        return Path(self.path).name
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How every piece is read.
+
+    Attributes:
+        columns: Which columns hold what, or what was said of some; None to go by their names.
+        description: The environment, if known.
+        missing: What becomes of steps without one of their values.
+        formulas: What a person wants derived.
+        features: That the states are to have; None for those which the piece has itself.
+    """
+
+    columns: ColumnMap | Roles | None = None
+    description: EnvironmentDescription | None = None
+    missing: Missing = "refuse"
+    formulas: tuple[str, ...] = ()
+    features: tuple[Feature, ...] | None = None
+
+
+def parquet_paths(given: Sequence[str | Path]) -> list[Path]:
+    """The files that paths, folders and patterns name.
+
+    Args:
+        given: As an argument has them.
+
+    Returns:
+        From the root, in their natural order, each once.
+
+    Raises:
+        InputError: If there is none, or one is no Parquet file.
+    """
+    paths: list[Path] = []
+    for path in map(Path, given):
+        if path.is_dir():
+            paths += [path / name for name in files_in_folder(path).sizes if _is_parquet(name)]
+            if not paths:
+                raise InputError(f"{path}: this folder holds no Parquet file; give one that does")
+        elif not path.exists() and _PATTERN.intersection(str(path)):
+            root = Path(path.anchor)
+            named = list(root.glob(str(path.relative_to(root))))
+            if not named:
+                raise InputError(f"{path}: no file has a name of this pattern; check it")
+            paths += named
+        else:
+            paths.append(path)
+    for path in paths:
+        if not path.is_file():
+            raise InputError(f"{path}: there is no such file; check the path")
+        if not _is_parquet(path.name):
+            raise InputError(f"{path}: a cluster reads Parquet files; write it as one")
+    return sorted({path.resolve() for path in paths}, key=lambda path: natural_order(str(path)))
+
+
+def pieces_of(paths: Sequence[Path], *, rows: int = ROWS) -> list[Piece]:
+    """Cut files into pieces, by what stands at their ends.
+
+    Args:
+        paths: Of `parquet_paths`.
+        rows: Of a piece, about; no row group is cut.
+
+    Returns:
+        In the order of the files.
+
+    Raises:
+        InputError: If a file is damaged, has other columns than the first, or holds too much in
+            one row group; or if there is no row at all.
+    """
+    import pyarrow.parquet as pq
+
+    pieces: list[Piece] = []
+    first: dict[str, str] = {}
+    for place, path in enumerate(paths):
+        with naming(path.name), refusing_damage(), pq.ParquetFile(path) as file:
+            kinds = {field.name: _kind(field.type) for field in file.schema_arrow}
+            first = first or kinds
+            _require_same(first, kinds, paths[0].name)
+            sizes = [
+                file.metadata.row_group(group).num_rows
+                for group in range(file.metadata.num_row_groups)
+            ]
+            if sizes:
+                require_memory(table_memory(max(sizes), len(kinds), 0))
+        for start, groups in _packed(sizes, rows):
+            pieces.append(
+                Piece(str(path), place, start, groups, sum(sizes[start : start + groups]))
+            )
+    if not pieces:
+        raise InputError("there are no steps in these files, only columns; give files with some")
+    return pieces
+
+
+def read_piece(piece: Piece, reading: Reading) -> Demonstrations:
+    """Read a piece.
+
+    Args:
+        piece: Of a file that this process can open.
+        reading: How.
+
+    Returns:
+        Its steps, of which the first and the last may belong to episodes that go on elsewhere.
+
+    Raises:
+        InputError: If it cannot be read, or holds something wrong; it names the file.
+    """
+    import pyarrow.parquet as pq
+
+    with naming(piece.name):
+        try:
+            with refusing_damage(), pq.ParquetFile(piece.path) as file:
+                texts = [field.name for field in file.schema_arrow if is_text(field.type)]
+            with refusing_damage(), pq.ParquetFile(piece.path, read_dictionary=texts) as file:
+                groups = list(range(piece.first, piece.first + piece.groups))
+                table = file.read_row_groups(groups, use_threads=False)
+        except InputError as error:
+            if Path(piece.path).is_file():
+                raise
+            raise InputError("it is gone since the work began; put it back, and begin anew") from (
+                error
+            )
+        recording = recording_from_table(arrow_table(table), reading.columns, reading.description)
+        called = [one.column for one in recording.columns if one.use == ROLE_WORDS["episode"]]
+        if called and is_text(table.schema.field(called[0]).type):
+            table = _with_numbers(table, called[0])
+            recording = recording_from_table(
+                arrow_table(table), reading.columns, reading.description
+            )
+        del table
+        if recording.episodes is None:
+            raise InputError(
+                "no column says to which episode a row belongs, and files are cut anywhere; number "
+                "the episodes, or say which column does: --column NAME=episode"
+            )
+        read = to_demonstrations(recording, reading.description, reading.missing)
+        if reading.formulas:
+            read = with_formulas(read, reading.formulas)
+        if reading.features is not None:
+            read = recoded(read, reading.features, called="it")
+        return read
+
+
+def some_rows(demonstrations: Demonstrations, rows: NDArray[np.bool_]) -> Demonstrations:
+    """Some steps of demonstrations.
+
+    Args:
+        demonstrations: N steps.
+        rows: Which, (N,); at least one.
+
+    Returns:
+        Those, in their present order.
+    """
+
+    def chosen(values: Any) -> Any:
+        return None if values is None else np.asarray(values)[rows]
+
+    names = ("actions", "episodes", "steps", "rewards", "terminated", "truncated", "times")
+    return replace(
+        demonstrations,
+        observations=demonstrations.raw_observations[rows],
+        **{name: chosen(getattr(demonstrations, name)) for name in names},
+    )
+
+
+def _with_numbers(table: Any, column: str) -> Any:
+    """A table whose episodes have numbers for names: the same ones in every piece."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    texts = pc.dictionary_encode(pc.cast(table.column(column), pa.large_string()))
+    whole = texts.unify_dictionaries().combine_chunks()
+    whole = whole.chunk(0) if isinstance(whole, pa.ChunkedArray) else whole
+    numbers = pa.array([_number(text) for text in whole.dictionary.to_pylist()], pa.int64())
+    return table.set_column(
+        table.schema.get_field_index(column), column, numbers.take(whole.indices)
+    )
+
+
+def _number(text: str) -> int:
+    """A number by chance, of those that a float holds exactly."""
+    return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "little") >> 11
+
+
+def _is_parquet(name: str) -> bool:
+    return name.lower().endswith(_ENDING)
+
+
+def _packed(sizes: Sequence[int], rows: int) -> Iterable[tuple[int, int]]:
+    """Row groups one after the other, so many that they have about the rows of a piece."""
+    before = 0
+    piece = []
+    for size in sizes:
+        piece.append(before // rows)
+        before += size
+    start = 0
+    for _, same in groupby(piece):
+        groups = len(list(same))
+        if any(sizes[start : start + groups]):
+            yield start, groups
+        start += groups
+
+
+def _kind(kind: Any) -> str:
+    """What a column holds, as far as it matters whether all files agree."""
+    import pyarrow as pa
+
+    if pa.types.is_dictionary(kind):
+        return _kind(kind.value_type)
+    if is_text(kind):
+        return "words"
+    if pa.types.is_boolean(kind):
+        return "true and false"
+    if pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind):
+        return "numbers"
+    return str(kind)
+
+
+def _require_same(first: dict[str, str], kinds: dict[str, str], called: str) -> None:
+    """Refuse a file with other columns than the first one."""
+    for name in first:
+        if name not in kinds:
+            raise InputError(
+                f"it has no column {quoted(name)}, and {called} has; give files of the same columns"
+            )
+    for name, kind in kinds.items():
+        if name not in first:
+            raise InputError(
+                f"it has a column {quoted(name)}, and {called} has none; give files of the same "
+                "columns"
+            )
+        if kind != first[name]:
+            raise InputError(
+                f"its column {quoted(name)} holds {kind}, and that of {called} {first[name]}; "
+                "write it alike in all files"
+            )
