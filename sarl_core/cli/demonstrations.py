@@ -134,7 +134,7 @@ def _suggest_columns(files: list[Path], columns: Columns, out: Path, as_json: bo
 
 
 def _tell_mined(files: list[Path], as_json: bool) -> None:
-    from sarl_core.cli.answers.summaries import describe_mined, print_mined
+    from sarl_core.cli.answers.mined import describe_mined, print_mined
     from sarl_core.mining.distributed.mined_files import load_mined_data
 
     document = describe_mined(load_mined_data(files[0]), files[0])

@@ -283,11 +283,10 @@ def _mine_at_a_distance(
             "--lower-bound asks what episodes say that a rule was not mined from, and none is held "
             "out; give --hold-out as well, as --hold-out 0.2"
         )
+    from sarl_core.cli.answers.mined import describe_mined, print_mined
     from sarl_core.cli.answers.summaries import (
-        describe_mined,
         describe_rules,
         print_learner,
-        print_mined,
         print_notes,
         print_rules,
     )

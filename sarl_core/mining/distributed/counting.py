@@ -91,14 +91,14 @@ def _counted(
         most[there[order][first]] = np.maximum.reduceat(states, first)
     episode = np.searchsorted(held_out, rows.episodes[held])
     key = (leaves[held] * len(held_out) + episode) * n_labels + labels[held]
-    kept, samples = np.unique(key, return_counts=True)
+    present, samples = np.unique(key, return_counts=True)
     states = rows.observations[mined]
     return TreeCounts(
         counts.reshape(n, n_labels),
         least,
         most,
         splits_of(structure.feature, structure.threshold, states) if len(states) else [None] * d,
-        np.stack([kept, samples]),
+        np.stack([present, samples]),
     )
 
 

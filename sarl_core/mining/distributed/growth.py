@@ -66,7 +66,7 @@ class DistributedGrowth:
         least: Rows that a node needs to be split.
         max_depth: Of the tree; None for no limit.
         seed: For choosing among equally good queries.
-        told: Called now and then with a share of the work, 0 to 1; may raise to end it.
+        advance: Called now and then with a share of the work, 0 to 1; may raise to end it.
     """
 
     client: Any
@@ -78,7 +78,7 @@ class DistributedGrowth:
     least: int = 2
     max_depth: int | None = None
     seed: int = 0
-    told: Callable[[float], None] = lambda share: None
+    advance: Callable[[float], None] = lambda share: None
     _nodes: list[_Node] = field(default_factory=list)
 
     def grow(self) -> TreeStructure:
@@ -125,13 +125,13 @@ class DistributedGrowth:
         """The upper part is half of the work, and the parts below are the other."""
         total = int(self.counts.sum())
         ready = sum(self._size(one) for one in small)
-        self.told(0.5 * ready / total + 0.5 * grown / total)
+        self.advance(0.5 * ready / total + 0.5 * grown / total)
 
     def _chosen(self, nodes: Sequence[int], at: Sequence[Any]) -> Queries:
         """Choose the queries of some nodes, and make their children."""
         labels = len(self.counts)
         together = max(1, _COUNTS // (self.features * self.bins * labels))
-        found = []
+        chosen = []
         for start in range(0, len(nodes), together):
             wanted = np.array(nodes[start : start + together], dtype=np.int64)
             parts = [
@@ -141,10 +141,10 @@ class DistributedGrowth:
                 for rows, where in zip(self.rows, at, strict=True)
             ]
             total = added_up(self.client, parts)
-            found.append(self.client.submit(best_queries, total).result())
+            chosen.append(self.client.submit(best_queries, total).result())
         best = BestQueries(
             *(
-                np.concatenate([getattr(one, name) for one in found])
+                np.concatenate([getattr(one, name) for one in chosen])
                 for name in ("feature", "border", "left", "right")
             )
         )

@@ -90,8 +90,8 @@ def sent_on(rows: BinnedRows, nodes: NDArray[np.int32], queries: Queries) -> NDA
     Returns:
         Shape (n,).
     """
-    at, asked = _places(nodes, queries.node)
-    which = np.flatnonzero(asked)
+    at, inside = _places(nodes, queries.node)
+    which = np.flatnonzero(inside)
     query = at[which]
     goes_left = rows.bins[which, queries.feature[query]] <= queries.border[query]
     further = nodes.copy()

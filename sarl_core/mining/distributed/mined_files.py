@@ -42,7 +42,7 @@ _DATE = (1980, 1, 1, 0, 0, 0)  # of every entry: the same content is the same fi
 _Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 
 
-class _Document(msgspec.Struct, forbid_unknown_fields=True):
+class _MinedDocument(msgspec.Struct, forbid_unknown_fields=True):
     format: Literal["sarl-mined"]
     version: Literal[1]
     digest: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{32}$")]
@@ -176,7 +176,7 @@ def _chained(parts: Sequence[NDArray[Any]], dtype: Any) -> NDArray[Any]:
     return np.concatenate(parts).astype(dtype) if parts else np.zeros(0, dtype=dtype)
 
 
-def _document(archive: zipfile.ZipFile) -> _Document:
+def _document(archive: zipfile.ZipFile) -> _MinedDocument:
     entry = _entry(archive, _DOCUMENT)
     try:
         document = parse_json(entry_content(archive, entry, _LONGEST))
@@ -186,7 +186,7 @@ def _document(archive: zipfile.ZipFile) -> _Document:
                 raise InputError(
                     f"it is of version {version}, and this program reads {_VERSION}; update it"
                 )
-        return conformed(document, _Document)
+        return conformed(document, _MinedDocument)
     except (MisfitError, ValueError) as error:
         raise InputError(f"its {_DOCUMENT} is wrong: {error}; mine it again") from error
 
@@ -213,7 +213,7 @@ def _read_arrays(archive: zipfile.ZipFile) -> dict[str, NDArray[Any]]:
 
 
 def _data(
-    document: _Document, sample: Demonstrations, arrays: Mapping[str, NDArray[Any]]
+    document: _MinedDocument, sample: Demonstrations, arrays: Mapping[str, NDArray[Any]]
 ) -> MinedData:
     features = sample.features
     source = Source(sample.env_id, features, document.digest, document.steps, document.episodes)

@@ -42,7 +42,7 @@ from sarl_core.progress import Progress, report
 SAMPLE_ROWS = 2**19
 """Rows by which bins and the inner sides of boxes are chosen, about; of fewer all are."""
 HELD_ROWS = 50_000
-"""Rows of the sample that is kept, about."""
+"""Rows of the sample that stay in a mined file, about."""
 MOST_HELD_OUT = 2_000
 """Episodes that are held out at most: more would say nothing that these do not."""
 _STEPS = 1_000  # of the progress
@@ -98,13 +98,13 @@ def mine_on_cluster(
         CancelledError: If the caller wants no more.
     """
 
-    def told(share: float) -> None:
+    def advance(share: float) -> None:
         report(progress, round(share * _STEPS), _STEPS)
 
     pieces = pieces_of(paths)
     with saying_losses():
-        told(0.0)
-        layout, reading = _surveyed(client, pieces, reading, lambda share: told(0.2 * share))
+        advance(0.0)
+        layout, reading = _surveyed(client, pieces, reading, lambda share: advance(0.2 * share))
         held_out = _held_out(layout, plan)
         mined = layout.sample
         if len(held_out):
@@ -120,7 +120,7 @@ def mine_on_cluster(
                 client.submit(bin_piece, piece, reading, placement, borders, plan.divider)
                 for piece in pieces
             ],
-            lambda share: told(0.2 + 0.2 * share),
+            lambda share: advance(0.2 + 0.2 * share),
         )
         dimensions = label_dimensions(mined, plan.divider)
         most = max(one.n_labels for one in dimensions)
@@ -140,7 +140,7 @@ def mine_on_cluster(
                 least=math.ceil(plan.min_support * steps),
                 max_depth=plan.max_depth,
                 seed=plan.seed,
-                told=lambda share, index=index: told(  # type: ignore[misc]
+                advance=lambda share, index=index: advance(  # type: ignore[misc]
                     0.4 + 0.4 * (index + share) / len(dimensions)
                 ),
             )
@@ -155,16 +155,16 @@ def mine_on_cluster(
                     client.submit(count_piece, piece, reading, placement, structures, plan.divider)
                     for piece in pieces
                 ],
-                lambda share: told(0.8 + 0.2 * share),
+                lambda share: advance(0.8 + 0.2 * share),
             ),
             together,
         ).result()
-        told(1.0)
+        advance(1.0)
     return _mined(layout, mined, held_out, structures, total, borders, in_bins, plan)
 
 
 def _surveyed(
-    client: Any, pieces: Sequence[Piece], reading: Reading, told: Callable[[float], None]
+    client: Any, pieces: Sequence[Piece], reading: Reading, advance: Callable[[float], None]
 ) -> tuple[Layout, Reading]:
     """The first pass. How the first piece is understood, all others are read."""
     share = min(1.0, SAMPLE_ROWS / sum(piece.rows for piece in pieces))
@@ -172,11 +172,13 @@ def _surveyed(
     if reading.columns is None:
         reading = replace(reading, columns=columns_of_head(first.head))
     futures = [client.submit(survey_piece, piece, reading, share) for piece in pieces[1:]]
-    surveys = [first, *(one.result() for one in _persisted(client, futures, told))]
+    surveys = [first, *(one.result() for one in _persisted(client, futures, advance))]
     return layout_of(pieces, surveys), reading
 
 
-def _persisted(client: Any, futures: Sequence[Any], told: Callable[[float], None]) -> Sequence[Any]:
+def _persisted(
+    client: Any, futures: Sequence[Any], advance: Callable[[float], None]
+) -> Sequence[Any]:
     """Wait until all are worked out, where they are, and say how far it is."""
     from distributed import as_completed
 
@@ -184,7 +186,7 @@ def _persisted(client: Any, futures: Sequence[Any], told: Callable[[float], None
     for done, future in enumerate(waiting, start=1):
         if future.status == "error":
             future.result()  # raises
-        told(done / len(futures))
+        advance(done / len(futures))
     return futures
 
 
@@ -227,7 +229,7 @@ def _mined(
     in_bins: NDArray[np.int64],
     plan: ClusterPlan,
 ) -> MinedData:
-    kept = _some(mined)
+    sample = _some(mined)
     steps = int(counted[0].counts.sum())
     episodes = len(layout.episodes) - len(held_out)
     digest = layout.digest
@@ -240,8 +242,8 @@ def _mined(
         tree = tree_of_counts(
             structure,
             counts.counts,
-            kept,
-            structure.apply(kept.observations),
+            sample,
+            structure.apply(sample.observations),
             index,
             divider=plan.divider,
             learner="histogram",
@@ -260,7 +262,7 @@ def _mined(
         trees.append(tree)
     return MinedData(
         tuple(trees),
-        kept,
+        sample,
         tuple(boxes),
         tuple(
             FeatureHistogram(own, in_bins[feature, : len(own) + 1])
@@ -279,7 +281,7 @@ def _mined(
 
 
 def _some(mined: Demonstrations) -> Demonstrations:
-    """Those of the sample that are kept, by their keys: the same ones every time."""
+    """Those of the sample that stay, by their keys: the same ones every time."""
     if len(mined) <= HELD_ROWS:
         return mined
     keys = row_keys(mined)
