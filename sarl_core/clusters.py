@@ -51,7 +51,7 @@ def cluster(address: str) -> Iterator[Any]:
             n_workers=int(local["workers"]),
             threads_per_worker=1,
             memory_limit=local["memory"] or "auto",
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",  # a free port: two of these are no conflict
             silence_logs=logging.CRITICAL,
         )
         with started, Client(started) as client:

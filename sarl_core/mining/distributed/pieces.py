@@ -110,12 +110,11 @@ def parquet_paths(given: Sequence[str | Path]) -> list[Path]:
     return sorted({path.resolve() for path in paths}, key=lambda path: natural_order(str(path)))
 
 
-def pieces_of(paths: Sequence[Path], *, rows: int = ROWS) -> list[Piece]:
-    """Cut files into pieces, by what stands at their ends.
+def pieces_of(paths: Sequence[Path]) -> list[Piece]:
+    """Cut files into pieces, by what stands at their ends; no row group is cut.
 
     Args:
         paths: Of `parquet_paths`.
-        rows: Of a piece, about; no row group is cut.
 
     Returns:
         In the order of the files.
@@ -139,7 +138,7 @@ def pieces_of(paths: Sequence[Path], *, rows: int = ROWS) -> list[Piece]:
             ]
             if sizes:
                 require_memory(table_memory(max(sizes), len(kinds), 0))
-        for start, groups in _packed(sizes, rows):
+        for start, groups in _packed(sizes):
             pieces.append(
                 Piece(str(path), place, start, groups, sum(sizes[start : start + groups]))
             )
@@ -242,12 +241,12 @@ def _is_parquet(name: str) -> bool:
     return name.lower().endswith(_ENDING)
 
 
-def _packed(sizes: Sequence[int], rows: int) -> Iterable[tuple[int, int]]:
+def _packed(sizes: Sequence[int]) -> Iterable[tuple[int, int]]:
     """Row groups one after the other, so many that they have about the rows of a piece."""
     before = 0
     piece = []
     for size in sizes:
-        piece.append(before // rows)
+        piece.append(before // ROWS)
         before += size
     start = 0
     for _, same in groupby(piece):

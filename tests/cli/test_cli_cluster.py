@@ -1,0 +1,127 @@
+"""`--cluster`: steps in Parquet files that are mined elsewhere, and mined files in their place."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sarl_core import RuleSet
+from sarl_core.cli.app import main
+
+DATA = Path(__file__).resolve().parents[2] / "data" / "demonstrations"
+LANDER = DATA / "lunar_lander.parquet"
+FILTERED = ("--support", "0.005", "--confidence", "0.9")
+
+
+@pytest.fixture(scope="module")
+def mined_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("mined") / "lander.mined"
+    held = ("--hold-out", "0.3", "--support", "0.001")
+    assert main(["mine", str(LANDER), "--cluster", "local:1", *held, "--out", str(path)]) == 0
+    return path
+
+
+def test_rules_of_a_cluster_are_those_of_its_mined_file(run, mined_file, tmp_path):
+    direct, again = tmp_path / "direct.json", tmp_path / "again.json"
+    command = ("mine", LANDER, "--cluster", "local:2", "--hold-out", "0.3")
+    printed = run(*command, "--support", "0.001", "--confidence", "0.9", "--out", direct)
+    assert "held out" in printed
+    assert "histogram" in printed
+    answer = json.loads(
+        run(
+            "mine",
+            mined_file,
+            "--support",
+            "0.001",
+            "--confidence",
+            "0.9",
+            "--out",
+            again,
+            "--json",
+        )
+    )
+    assert answer["held_out"]["episodes"] == sorted(answer["held_out"]["episodes"])
+    assert len(answer["held_out"]["episodes"]) == round(0.3 * 62)
+    assert RuleSet.load(direct).digest == RuleSet.load(again).digest
+    assert RuleSet.load(direct).rule_count == answer["rules"] > 20
+
+
+def test_combinations_and_formulas_are_chosen_and_worked_out_on_the_cluster(run, tmp_path):
+    out = tmp_path / "rules.json"
+    further = (
+        "--combine",
+        "vertical position, vertical velocity",
+        "--feature",
+        "twice = 2 * angle",
+    )
+    run("mine", LANDER, "--cluster", "local:1", *FILTERED, *further, "--out", out)
+    derived = [one for one in RuleSet.load(out).source.features if one.derived is not None]
+    assert any(one.name == "twice" for one in derived)
+    assert any("times the vertical velocity" in one.name for one in derived)
+
+
+def test_a_lower_bound_drops_rules(run, mined_file, tmp_path):
+    every, sure = tmp_path / "every.json", tmp_path / "sure.json"
+    run("mine", mined_file, *FILTERED, "--out", every)
+    printed = run("mine", mined_file, *FILTERED, "--lower-bound", "0.8", "--out", sure)
+    assert "lower bound" in printed
+    left = {rule.id for rule in RuleSet.load(every) if (rule.held_out.low or 0) >= 0.8}
+    assert {rule.id for rule in RuleSet.load(sure)} == left
+
+
+def test_a_mined_file_answers_check_and_landscape(run, mined_file, tmp_path):
+    document = json.loads(run("check", mined_file, "--json"))
+    assert 0 < document["steps"] < 15_000
+    assert document["held_out_episodes"] == 19
+    assert document["min_support"] == 0.001
+    assert sum(document["trees"][0]["labels"].values()) == document["steps"]
+    assert "what is left of" in run("check", mined_file)
+    printed = run("landscape", mined_file, "--out", tmp_path / "plane.json")
+    assert "grown down to a support of 0.001" in printed
+    plane = json.loads((tmp_path / "plane.json").read_text())
+    assert plane["rule_count"][0][-1] > plane["rule_count"][-1][-1]
+
+
+WRONG = {
+    "no thresholds": (["FILE", "--cluster", "local:1", "--out", "r.json"], "give both --support"),
+    "a mined file of no cluster": (["FILE", "--out", "r.mined"], "give these and --cluster"),
+    "cross-fitting": (
+        ["FILE", "--cluster", "local:1", "--cross-fit", *FILTERED, "--out", "r.json"],
+        "--cross-fit needs all steps in one memory",
+    ),
+    "an exact learner": (
+        ["MINED", "--learner", "exact", *FILTERED, "--out", "r.json"],
+        "--learner exact needs all steps in one memory",
+    ),
+    "other episodes": (
+        ["MINED", "--hold-out", "0.5", *FILTERED, "--out", "r.json"],
+        "what is held out, and where, was settled when it was mined",
+    ),
+    "too little support": (
+        ["MINED", "--support", "0", "--confidence", "1", "--out", "r.json"],
+        "these trees were grown down to 0.001",
+    ),
+    "a bound of nothing": (
+        ["FILE", "--cluster", "local:1", "--lower-bound", "0.5", *FILTERED, "--out", "r.json"],
+        "none is held out; give --hold-out",
+    ),
+    "no cluster": (
+        ["FILE", "--cluster", "here", *FILTERED, "--out", "r.json"],
+        "'here' is no cluster",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_cannot_be_is_one_sentence(what, mined_file, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    arguments, sentence = WRONG[what]
+    names = {"FILE": str(LANDER), "MINED": str(mined_file)}
+    code = main(["mine", *(names.get(one, one) for one in arguments)])
+    printed = capsys.readouterr()
+    assert code == 2
+    assert sentence in printed.err
+    assert printed.err.count("\n") == 1
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,183 @@
+"""Folders of files as they come: what they have in common, and what is refused."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from sarl_core import InputError, WorkError
+from sarl_core.clusters import cluster, saying_losses
+from sarl_core.mining.distributed import pieces
+from sarl_core.mining.distributed.pieces import Reading, parquet_paths, read_piece
+from tests.mining.distributed.conftest import Mine
+
+
+def steps(rows: int = 400, first: int = 0, seed: int = 0) -> pd.DataFrame:
+    rng = np.random.default_rng([seed, first])
+    table = pd.DataFrame(
+        {
+            "episode": first + np.arange(rows) // 50,
+            "obs_speed": rng.normal(size=rows),
+            "obs_gap": rng.normal(size=rows),
+        }
+    )
+    return table.assign(action=(table.obs_speed > 0).astype(int) + (table.obs_gap > 1))
+
+
+def folder_of(path: Path, *tables: pd.DataFrame) -> Path:
+    path.mkdir(exist_ok=True)
+    for number, table in enumerate(tables):
+        table.to_parquet(path / f"log-{number}.parquet")
+    return path
+
+
+def test_labels_that_one_file_has_and_another_has_not(tmp_path: Path, mine: Mine) -> None:
+    few = steps().assign(action=lambda table: table.action.clip(upper=1))
+    mined = mine(folder_of(tmp_path / "logs", few, steps(first=10)))
+    assert mined.trees[0].dimension.actions == (0, 1, 2)
+    assert mined.trees[0].counts[0].sum() == 800
+
+
+def test_words_for_actions_and_features_differ_between_files(tmp_path: Path, mine: Mine) -> None:
+    words = np.array(["go", "brake", "stop"])
+    first = steps().assign(action=lambda table: words[table.action.clip(upper=1)], obs_mode="light")
+    second = steps(first=10).assign(
+        action=lambda table: words[table.action],
+        obs_mode=lambda table: np.where(table.obs_gap > 0, "heavy", "light"),
+    )
+    mined = mine(folder_of(tmp_path / "logs", first, second))
+    (tree,) = mined.trees
+    assert tree.dimension.label_names == ("brake", "go", "stop")
+    both = pd.concat([first, second])
+    assert tree.counts[0].tolist() == [int((both.action == word).sum()) for word in sorted(words)]
+    names = [one.name for one in mined.sample.features]
+    assert names == ["speed", "gap", "mode is heavy"]
+    heavy = mined.histograms[2].counts
+    assert heavy.tolist() == [int((both.obs_mode != mode).sum()) for mode in ("heavy", "light")]
+
+
+def test_numbers_of_episodes_that_begin_again_are_other_episodes(
+    tmp_path: Path, mine: Mine
+) -> None:
+    again = mine(folder_of(tmp_path / "again", steps(), steps(seed=1)))
+    goes_on = mine(folder_of(tmp_path / "on", steps(), steps(first=8)))
+    assert again.trees[0].source.episodes == goes_on.trees[0].source.episodes == 16
+    texts = [f"trip {number}" for number in steps().episode]
+    named = mine(folder_of(tmp_path / "named", steps().assign(episode=texts)), hold_out=0.5)
+    assert named.trees[0].source.episodes == 4
+    assert named.held_out[0].lengths.tolist() == [50] * 4
+
+
+def test_bounds_of_continuous_actions_are_those_of_all_files(tmp_path: Path, mine: Mine) -> None:
+    tables = [
+        steps(first=first).assign(action=lambda table, by=by: table.obs_speed * by)
+        for first, by in ((0, 1.0), (10, 3.0))
+    ]
+    mined = mine(folder_of(tmp_path / "logs", *tables), divider=4, min_support=0.05)
+    edges = mined.trees[0].dimension.edges
+    values = pd.concat(tables).action.astype(np.float32)
+    assert (edges[0], edges[-1]) == (float(values.min()), float(values.max()))
+
+
+FAULTS = {
+    "other columns": (
+        lambda table: table.rename(columns={"obs_gap": "obs_distance"}),
+        "log-1.parquet: it has no column 'obs_gap', and log-0.parquet has; give",
+    ),
+    "a further column": (
+        lambda table: table.assign(obs_rain=1.0),
+        "log-1.parquet: it has a column 'obs_rain', and log-0.parquet has none; give",
+    ),
+    "other types": (
+        lambda table: table.assign(obs_gap="far"),
+        "log-1.parquet: its column 'obs_gap' holds words, and that of log-0.parquet numbers; write",
+    ),
+    "a missing value": (
+        lambda table: table.assign(obs_gap=table.obs_gap.where(table.index != 7)),
+        "log-1.parquet: column 'obs_gap' is empty or not a number .* row 8; mend it",
+    ),
+    "continuous actions beside labels": (
+        lambda table: table.assign(action=table.obs_speed),
+        "look like labels in some of these files .* log-0.parquet and log-1.parquet; say",
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_file_unlike_the_others_is_named(fault: str, tmp_path: Path, mine: Mine) -> None:
+    change, sentence = FAULTS[fault]
+    folder = folder_of(tmp_path / "logs", steps(), change(steps(first=10)))
+    with pytest.raises(InputError, match=sentence):
+        mine(folder)
+
+
+def test_folders_without_steps(tmp_path: Path, mine: Mine) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="holds no Parquet file; give one that does"):
+        mine(tmp_path / "empty")
+    with pytest.raises(InputError, match="there are no steps in these files, only columns"):
+        mine(folder_of(tmp_path / "bare", steps(0)))
+    with pytest.raises(InputError, match="no column says to which episode a row belongs"):
+        mine(folder_of(tmp_path / "loose", steps().drop(columns="episode")))
+    with pytest.raises(InputError, match="no file has a name of this pattern"):
+        parquet_paths([tmp_path / "*.parquet"])
+    (tmp_path / "log.csv").write_text("obs_a,action\n1,0\n")
+    with pytest.raises(InputError, match="a cluster reads Parquet files; write it as one"):
+        parquet_paths([tmp_path / "log.csv"])
+
+
+def test_damaged_and_vanished_files(tmp_path: Path, mine: Mine) -> None:
+    folder = folder_of(tmp_path / "logs", steps(), steps(first=10))
+    (piece, _) = pieces.pieces_of(parquet_paths([folder]))
+    (folder / "log-0.parquet").unlink()
+    with pytest.raises(InputError, match=r"log-0.parquet: it is gone since the work began; put"):
+        read_piece(piece, Reading())
+    second = folder / "log-1.parquet"
+    second.write_bytes(second.read_bytes()[:-40])
+    with pytest.raises(InputError, match=r"log-1.parquet: it is damaged or cut off"):
+        mine(folder)
+
+
+def test_one_episode_cannot_be_held_out(tmp_path: Path, mine: Mine) -> None:
+    with pytest.raises(InputError, match="there is one episode, and holding it out leaves none"):
+        mine(folder_of(tmp_path / "logs", steps(50)), hold_out=0.5)
+
+
+@pytest.mark.parametrize(
+    ("address", "sentence"),
+    [
+        ("scheduler", "'scheduler' is no cluster; give the address of a scheduler"),
+        ("local:0", "'local:0' has no process; give one or more"),
+        ("local:two", "is no cluster"),
+        ("tcp://127.0.0.1:9", "no scheduler answers at 'tcp://127.0.0.1:9'; check the address"),
+    ],
+)
+def test_clusters_that_are_none(address: str, sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence), cluster(address):
+        pass
+
+
+def test_workers_of_another_version(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    address = client.scheduler.address
+    with cluster(address) as same:
+        assert same.submit(sum, [1, 2]).result() == 3
+    monkeypatch.setattr("sarl_core.__version__", "99.0")
+    with (
+        pytest.raises(InputError, match=r"the worker tcp://\S+ has version \S+ of this package"),
+        cluster(address),
+    ):
+        pass
+
+
+def test_work_that_ends_every_worker() -> None:
+    with (
+        cluster("local:1") as other,
+        pytest.raises(WorkError, match="several workers ended over the same piece of work"),
+        saying_losses(),
+    ):
+        other.submit(os._exit, 1).result()
