@@ -8,14 +8,65 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 from sarl_core.errors import InputError, WorkError, needing_extras, quoted
 
 _LOCAL = re.compile(r"local:(?P<workers>\d{1,3})(?::(?P<memory>\d+(?:\.\d+)?\s*[kMGT]i?B))?")
 _SECONDS = 10  # to wait for a scheduler, and for its first worker
+
+Result = TypeVar("Result")
+Arguments = ParamSpec("Arguments")
+
+
+class ClusterExecutor(Executor):
+    """The processes of a cluster, as those of this machine."""
+
+    def __init__(self, client: Any) -> None:
+        """Take its client, which somebody else closes.
+
+        Args:
+            client: A ``distributed.Client``.
+        """
+        self._client = client
+        self._executor = client.get_executor(pure=False)
+
+    @property
+    def workers(self) -> int:
+        """How many calls it works on at once now: workers come and go."""
+        return max(1, sum(map(int, self._client.nthreads().values())))
+
+    def submit(
+        self,
+        call: Callable[Arguments, Result],
+        /,
+        *arguments: Arguments.args,
+        **named: Arguments.kwargs,
+    ) -> Future[Result]:
+        """See `Executor.submit`."""
+        future: Future[Result] = self._executor.submit(call, *arguments, **named)
+        return future
+
+
+@contextmanager
+def cluster_executor(address: str) -> Iterator[ClusterExecutor]:
+    """Processes of a cluster, for whoever takes an executor.
+
+    Args:
+        address: As of `cluster`.
+
+    Yields:
+        The executor.
+
+    Raises:
+        InputError: As `cluster`.
+        WorkError: Likewise; or if the cluster cannot go on.
+    """
+    with cluster(address) as client, saying_losses():
+        yield ClusterExecutor(client)
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from typing import Any, ParamSpec, TypeVar
 from sarl_core.errors import SarlError, WorkError
 from sarl_core.progress import CancelledError, Progress, report
 
-_AHEAD = 16  # calls on their way to an executor that does not say how many it works on
+_UNSAID = 15  # calls that an executor works on at once which does not say how many they are
 _IDLE_SECONDS = 300  # after which a process that nobody needs ends
 _LOOK_SECONDS = 0.5  # between two looks at whether the caller still wants it
 _PARENT_SECONDS = 2.0  # between two looks at whether the process that asked is still there
@@ -98,6 +98,12 @@ def processes(jobs: int) -> Processes:
     return Processes(jobs)
 
 
+def workers_of(executor: Executor) -> int:
+    """How many calls an executor works on at once, as far as it says so."""
+    workers = getattr(executor, "workers", None)
+    return workers if isinstance(workers, int) and workers > 0 else _UNSAID
+
+
 def executor_of(jobs: int, executor: Executor | None) -> Executor | None:
     """Who works where a caller names an executor, or a number of processes.
 
@@ -150,7 +156,7 @@ def completed(
     """
     # One more than are worked on, so that nobody waits for this loop; not all at once, so that
     # another caller's come in between, and since each carries its arguments along.
-    most = executor.workers + 1 if isinstance(executor, Processes) else _AHEAD
+    most = workers_of(executor) + 1
     waiting = iter(calls)
     running: dict[Future[Result], Key] = {}
     try:

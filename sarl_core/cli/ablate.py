@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import read_agent, read_shield
+from sarl_core.cli.inputs import read_agent, read_shield, workers_at
 from sarl_core.cli.options import (
     AgentName,
+    ClusterAddress,
     Env,
     Json,
     MaxSteps,
@@ -67,6 +68,7 @@ def ablate(
             "same.",
         ),
     ] = None,
+    cluster: ClusterAddress = None,
     out: Annotated[
         Path | None, out_option("Write the table to this file.", metavar="FILE.csv")
     ] = None,
@@ -82,7 +84,7 @@ def ablate(
     """
     if out is not None:
         terminal.check_output(out, (".csv",))
-    with terminal.working("Taking rules out") as advance:
+    with workers_at(cluster) as executor, terminal.working("Taking rules out") as advance:
         from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
         from sarl_core.studies.ablation_run import ablate as run
 
@@ -96,6 +98,7 @@ def ablate(
             seed=seed,
             most=most,
             jobs=jobs or os.cpu_count() or 1,
+            executor=executor,
             max_steps=max_steps,
             progress=lambda done, total: advance(done, total),
         )

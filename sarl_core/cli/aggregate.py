@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import pairs_of, read_agent, read_demonstrations
+from sarl_core.cli.inputs import pairs_of, read_agent, read_demonstrations, workers_at
 from sarl_core.cli.options import (
     AgentName,
     ChoiceName,
+    ClusterAddress,
     Columns,
     Derived,
     Divider,
@@ -34,6 +35,8 @@ from sarl_core.cli.stand_ins import said
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from sarl_core.agents.agent import Agent
     from sarl_core.demonstrations.dataset import Demonstrations
     from sarl_core.environments.environment import EnvironmentOrId
@@ -135,6 +138,7 @@ def aggregate(
     seed: Seed = 0,
     max_steps: MaxSteps = None,
     jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 1,
+    cluster: ClusterAddress = None,
     as_json: Json = False,
 ) -> None:
     """Ask the expert where the rules lead, and mine few rules that do as much as possible.
@@ -183,9 +187,10 @@ def aggregate(
         start = with_formulas(start, derived.formulas)
         plan = replace(plan, combined=pairs_of(start, derived))
     if nobody:
-        _gaps(start, plan, environment, agents[0], out, jobs, as_json, notes)
+        with workers_at(cluster) as executor:
+            _gaps(start, plan, environment, agents[0], out, jobs, executor, as_json, notes)
         return
-    with terminal.working("Asking the expert") as advance:
+    with workers_at(cluster) as executor, terminal.working("Asking the expert") as advance:
         from sarl_core.improving.aggregation import aggregate as run
         from sarl_core.improving.aggregation_files import save_aggregation
 
@@ -196,6 +201,7 @@ def aggregate(
             agent=agents[0],
             expert=agents[1],
             jobs=jobs,
+            executor=executor,
             progress=advance,
         )
     written, card = save_aggregation(aggregation, out, command=_command(context))
@@ -299,6 +305,7 @@ def _gaps(
     agent: Agent,
     out: Path,
     jobs: int,
+    executor: Executor | None,
     as_json: bool,
     notes: tuple[str, ...],
 ) -> None:
@@ -329,6 +336,7 @@ def _gaps(
                 seed=plan.seed,
                 projection=plan.projection,
                 jobs=jobs,
+                executor=executor,
                 max_steps=plan.max_steps,
                 progress=advance,
             ):
@@ -391,7 +399,11 @@ def _command(context: typer.Context) -> str:
     words = ["python -m sarl_core aggregate"]
     for parameter in context.command.params:
         value = context.params.get(parameter.name or "")
-        if parameter.name in ("as_json", "jobs") or value is None or value == parameter.default:
+        if (
+            parameter.name in ("as_json", "jobs", "cluster")
+            or value is None
+            or value == parameter.default
+        ):
             continue
         option = [] if parameter.param_type_name == "argument" else [parameter.opts[0]]
         for one in value if isinstance(value, (list, tuple)) else [value]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import read_agent, read_shield
+from sarl_core.cli.inputs import read_agent, read_shield, workers_at
 from sarl_core.cli.options import (
     AgentName,
+    ClusterAddress,
     Env,
     Json,
     MaxSteps,
@@ -26,6 +28,9 @@ from sarl_core.cli.options import (
 )
 from sarl_core.cli.stand_ins import called
 from sarl_core.errors import InputError
+
+if TYPE_CHECKING:
+    from sarl_core.rollouts.episodes import Episodes
 
 
 @with_played_environment
@@ -48,6 +53,15 @@ def evaluate(
     outside: OutsideName = "act",
     on_invalid: OnInvalidName = "raise",
     max_steps: MaxSteps = None,
+    cluster: ClusterAddress = None,
+    out: Annotated[
+        Path | None,
+        out_option(
+            "Write every episode to this file, some thousand at a time, and answer with the "
+            "summary alone.",
+            metavar="FILE.parquet",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run episodes, shielded or not: returns, failures, interventions, coverage, freedom.
@@ -55,7 +69,10 @@ def evaluate(
     Example: `python -m sarl_core evaluate --env LunarLander-v3 --agent novice --rules rules.json
     --episodes 50 --seed 1 --json`
     """
-    with terminal.working("Running episodes") as advance:
+    if out is not None:
+        terminal.check_output(out, (".parquet",))
+    with workers_at(cluster) as executor, terminal.working("Running episodes") as advance:
+        from sarl_core.rollouts.episode_tables import rollout_into
         from sarl_core.rollouts.episodes import finished_before, rollout
         from sarl_core.rollouts.player import EpisodeFaultError
 
@@ -63,12 +80,14 @@ def evaluate(
         actor = read_agent(agent, env, normalise, stochastic=stochastic, seed=seed)
         fault: EpisodeFaultError | None = None
         try:
-            played = rollout(
+            play = rollout if out is None else partial(rollout_into, out)
+            played = play(
                 env,
                 actor,
                 shield=shield,
                 episodes=episodes,
                 seed=seed,
+                executor=executor,
                 keep_steps=False,
                 max_steps=max_steps,
                 progress=advance,
@@ -78,7 +97,7 @@ def evaluate(
             if finished is None:
                 raise
             fault, played = error, finished
-        document = played.to_dict()
+        document = played.to_dict() if out is None else _summary(played, out)
     if as_json:
         terminal.print_json(document)
     else:
@@ -88,6 +107,17 @@ def evaluate(
         print_episodes(document, str(env), f"{played.agent} in {env}, {shielded}", shield)
     if fault is not None:
         raise InputError(f"{fault}; the answer is of the {len(played)} before that one")
+
+
+def _summary(played: Episodes, out: Path) -> dict[str, Any]:
+    """What is told of episodes that stand in a file."""
+    return {
+        "file": str(out),
+        "count": len(played),
+        "summary": played.summary(),
+        "notes": list(played.remarks),
+        "environment": played.env_id,
+    }
 
 
 @with_played_environment

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -14,6 +15,8 @@ from sarl_core.environments.environment import Environment, EnvironmentOrId
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from sarl_core.agents.agent import Agent
     from sarl_core.demonstrations.dataset import Demonstrations
     from sarl_core.demonstrations.formats.mapping.roles import Roles
@@ -103,6 +106,22 @@ def read_demonstrations(
 def is_mined_file(path: Path) -> bool:
     """Whether a path is called as files are that hold what is left of steps."""
     return path.suffix.lower() == MINED
+
+
+def workers_at(address: str | None) -> AbstractContextManager[Executor | None]:
+    """The processes of a cluster for episodes, for the time of a block.
+
+    Args:
+        address: Of the option ``--cluster``; None for this process.
+
+    Returns:
+        Gives an executor, or None.
+    """
+    if address is None:
+        return nullcontext(None)
+    from sarl_core.clusters import cluster_executor
+
+    return cluster_executor(address)
 
 
 def mine_on(

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import read_agent
+from sarl_core.cli.inputs import read_agent, workers_at
 from sarl_core.cli.options import (
     ChoiceName,
+    ClusterAddress,
     Env,
     Json,
     MaxSteps,
@@ -88,6 +89,7 @@ def learn(
         bool, typer.Option("--figures", help="Also draw the study, as .png.")
     ] = False,
     watched: Annotated[bool, typer.Option("--stop-with-input", hidden=True)] = False,
+    cluster: ClusterAddress = None,
     as_json: Json = False,
 ) -> None:
     """Let agents learn, with a shield and without, and see what they are worth without it.
@@ -128,7 +130,8 @@ def learn(
             return not stopped()
 
         try:
-            study = run_study(plan, out, progress=advance_or_stop)
+            with workers_at(cluster) as executor:
+                study = run_study(plan, out, executor=executor, progress=advance_or_stop)
         except CancelledError as error:
             raise terminal.StoppedError(str(error)) from error
     summaries = summarise_study(study)

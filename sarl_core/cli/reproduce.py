@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.options import Json, out_option
+from sarl_core.cli.inputs import workers_at
+from sarl_core.cli.options import ClusterAddress, Json, out_option
 
 if TYPE_CHECKING:
     from sarl_core.paper.report import Entry, PaperReport
@@ -42,6 +44,7 @@ def reproduce(
             help="Few episodes and little learning, to see that everything works.",
         ),
     ] = False,
+    cluster: ClusterAddress = None,
     as_json: Json = False,
 ) -> None:
     """Reproduce the paper's figures and hold its claims against ours.
@@ -71,7 +74,9 @@ def reproduce(
             yield advance
 
     try:
-        report = run(out, chosen, effort=QUICK if quick else FULL, watch=watch, finished=finished)
+        with workers_at(cluster) as executor:
+            effort = replace(QUICK if quick else FULL, executor=executor)
+            report = run(out, chosen, effort=effort, watch=watch, finished=finished)
     except KeyboardInterrupt as error:
         usable = f"{', '.join(done)} in {out} can be used" if done else "no figure was finished"
         raise terminal.StoppedError(f"stopped; {usable}") from error

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,10 +14,16 @@ import numpy as np
 
 from sarl_core.agents.agent import Agent
 from sarl_core.environments.environment import EnvironmentOrId, as_environment
-from sarl_core.errors import InputError, WorkError
+from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.learning.arms import LearningArm, check_learning
 from sarl_core.learning.curves import NO_EPISODES, LearningEpisodes, Trial
-from sarl_core.learning.run import TRIAL_EPISODES, DivergedError, learn, try_agent
+from sarl_core.learning.run import (
+    TRIAL_EPISODES,
+    DivergedError,
+    LearningResult,
+    learn,
+    try_agent,
+)
 from sarl_core.learning.study_files import (
     FORMAT,
     PLAN,
@@ -36,12 +45,14 @@ from sarl_core.learning.study_files import (
 )
 from sarl_core.learning.summary import summarise_study
 from sarl_core.mining.rule_set import RuleSet, rules_digest
+from sarl_core.processes import completed
 from sarl_core.progress import CancelledError, Progress
 from sarl_core.rollouts.choices import Choice, check_choice
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
 
 MAX_STEPS = 10_000_000  # of a run; a mistyped zero shall not work for a week
+_LOST = "a process that let somebody learn ended unexpectedly; run the same order again"
 _WRITTEN_EVERY = 1.0  # seconds, for who looks on
 
 
@@ -139,7 +150,11 @@ class LearningPlan:
 
 
 def run_study(
-    plan: LearningPlan, folder: Path, *, progress: Progress | None = None
+    plan: LearningPlan,
+    folder: Path,
+    *,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
 ) -> LearningStudy:
     """Let every arm learn with every seed; go on where an earlier sitting stopped.
 
@@ -151,6 +166,8 @@ def run_study(
     Args:
         plan: What is to be learned.
         folder: Made if it is not there.
+        executor: Its processes let several learn at once, each from its beginning to its end; here,
+            one after the other, where there is none.
         progress: Called with (steps done, in all, over all runs); returning False stops.
 
     Returns:
@@ -171,7 +188,9 @@ def run_study(
         if plan.agent is not None:
             # First: an agent that cannot play shall be known of before hours of learning.
             save_compared(folder, _compared(plan, plan.agent, progress))
-        for index, (seed, arm) in enumerate(runs):
+        if executor is not None:
+            diverged += _at_once(plan, folder, runs, executor, progress)
+        for index, (seed, arm) in enumerate(runs if executor is None else ()):
             before = index * plan.steps
 
             def advance(done: int, _: int, before: int = before) -> bool:
@@ -202,6 +221,51 @@ def run_study(
             f"{len(diverged)} failed ({diverged[0]})"
         )
     return study
+
+
+def _at_once(
+    plan: LearningPlan,
+    folder: Path,
+    runs: Sequence[tuple[int, LearningArm]],
+    executor: Executor,
+    progress: Progress | None,
+) -> list[str]:
+    """Let several learn at once; what is finished is saved, and what is not begins anew later.
+
+    Returns:
+        Sentences on runs that diverged.
+    """
+    diverged: list[str] = []
+    waiting = [(seed, arm) for seed, arm in runs if not _finished(folder, arm, seed)]
+    done = len(runs) - len(waiting)
+    calls = ((run, _learned, (plan, *run)) for run in waiting)
+    with closing(completed(executor, calls, lost=_LOST)) as batches:
+        for batch in batches:
+            for (seed, arm), outcome in batch:
+                if isinstance(outcome, DivergedError):
+                    diverged.append(f"{arm.title}, seed {seed}: {outcome}")
+                elif isinstance(outcome, SarlError):
+                    raise outcome
+                else:
+                    _save(folder, outcome)
+                done += 1
+            if progress is not None and not progress(done * plan.steps, len(runs) * plan.steps):
+                raise CancelledError("stopped")
+    return diverged
+
+
+def _learned(plan: LearningPlan, seed: int, arm: LearningArm) -> LearningResult:
+    """One run from its beginning to its end."""
+    return learn(
+        plan.env_id,
+        plan.rules,
+        arm,
+        steps=plan.steps,
+        seed=seed,
+        projection=plan.projection,
+        episodes=plan.episodes,
+        max_steps=plan.max_steps,
+    )
 
 
 def _claim(folder: Path, plan: LearningPlan) -> None:
@@ -286,13 +350,18 @@ def _one(plan: LearningPlan, folder: Path, arm: LearningArm, seed: int, progress
     except (CancelledError, WorkError):
         save_run(folder, latest)
         raise
-    result.policy.save(policy_path(folder, arm, seed))
+    _save(folder, result)
+    remove(checkpoint)
+
+
+def _save(folder: Path, result: LearningResult) -> None:
+    result.policy.save(policy_path(folder, result.arm, result.seed))
     save_run(
         folder,
         LearningRun(
-            arm,
-            seed,
-            plan.steps,
+            result.arm,
+            result.seed,
+            result.steps,
             result.curve,
             result.alone,
             result.shielded,
@@ -300,7 +369,6 @@ def _one(plan: LearningPlan, folder: Path, arm: LearningArm, seed: int, progress
             result.sittings,
         ),
     )
-    remove(checkpoint)
 
 
 def _sum_up(folder: Path, study: LearningStudy) -> None:

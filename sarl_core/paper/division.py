@@ -86,6 +86,7 @@ def measure(effort: Effort, progress: Progress | None) -> pd.DataFrame:
             seed=replicate.first_seed,
             # The walker's physics take nearly all the time; the result is the same, bit for bit.
             jobs=1 if effort.quick else os.cpu_count() or 1,
+            executor=effort.executor,
             progress=advance,
         )
         own = {

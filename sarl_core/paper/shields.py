@@ -99,6 +99,7 @@ def measure(
             seed=replicate.first_seed,
             # The result is the same, bit for bit.
             jobs=1 if effort.quick or env_id != _SLOW else os.cpu_count() or 1,
+            executor=effort.executor,
             progress=part_of(progress, len(parts) * effort.episodes, total),
         )
         parts.append(

@@ -15,6 +15,8 @@ from sarl_core.paper.verdicts import Claim
 from sarl_core.progress import Progress
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     import numpy as np
     import pandas as pd
     import plotly.graph_objects as go
@@ -35,6 +37,8 @@ class Effort:
         test_steps: Steps of each test between them.
         episodes: Episodes of each way to act in Figures 5 to 7, for each recording.
         snapped_episodes: Episodes of each way to divide actions, likewise.
+        executor: Whose processes play the episodes; this machine's where not given. The result is
+            the same, bit for bit.
     """
 
     quick: bool
@@ -43,6 +47,7 @@ class Effort:
     test_steps: int
     episodes: int
     snapped_episodes: int
+    executor: Executor | None = None
 
 
 FULL = Effort(

@@ -25,7 +25,7 @@ from sarl_core.environments.failures import ends_tell, failed
 from sarl_core.errors import SarlError, require_whole
 from sarl_core.mining.language import share_text
 from sarl_core.notebooks import table_html
-from sarl_core.processes import completed, executor_of
+from sarl_core.processes import completed, executor_of, workers_of
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.failures import safety_facts
 from sarl_core.rollouts.player import EpisodeFaultError, Observer, play
@@ -501,7 +501,8 @@ def rollout(
     if workers is None:
         return work(env_id, actor, shield, seeds, finished=lambda: finished(1))
     # None larger than what runs side by side: who stops a long run need not wait for a part of it.
-    pieces = np.array_split(seeds, min(episodes, max(jobs * _ROUNDS, -(-episodes // batch))))
+    rounds = workers_of(workers) * _ROUNDS
+    pieces = np.array_split(seeds, min(episodes, max(rounds, -(-episodes // batch))))
     calls = ((place, work, (env_id, actor, shield, piece)) for place, piece in enumerate(pieces))
     parts: dict[int, Episodes] = {}
     with closing(completed(workers, calls, lost=LOST)) as batches:

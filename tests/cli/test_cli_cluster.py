@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
-from sarl_core import RuleSet
+from sarl_core import RuleSet, rollout
 from sarl_core.cli.app import main
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "demonstrations"
@@ -125,3 +127,64 @@ def test_what_cannot_be_is_one_sentence(what, mined_file, tmp_path, monkeypatch,
     assert sentence in printed.err
     assert printed.err.count("\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+# --- episodes ------------------------------------------------------------------------------------
+
+
+def test_episodes_of_a_cluster_are_those_of_one_machine(run, tmp_path):
+    rules = tmp_path / "rules.json"
+    run("mine", LANDER, *FILTERED, "--out", rules)
+    command = ("evaluate", "--env", "LunarLander-v3", "--agent", "novice", "--rules", rules)
+    command += ("--episodes", "9", "--seed", "3", "--json")
+    here = json.loads(run(*command))
+    assert json.loads(run(*command, "--cluster", "local:2")) == here
+    out = tmp_path / "episodes.parquet"
+    answer = json.loads(run(*command, "--cluster", "local:2", "--out", out))
+    assert answer["summary"] == here["summary"]
+    assert answer["count"] == 9
+    table = pd.read_parquet(out)
+    assert table["seed"].tolist() == list(range(3, 12))
+    assert table["return"].tolist() == [one["return"] for one in here["episodes"]]
+    printed = run(*command[:-1], "--out", out)
+    assert f"Wrote {out}: 9 episodes" in printed
+
+
+def test_episodes_are_written_some_at_a_time(run, tmp_path, monkeypatch):
+    monkeypatch.setattr("sarl_core.rollouts.episode_tables._AT_ONCE", 4)
+    out = tmp_path / "episodes.parquet"
+    run("evaluate", "--env", "CartPole-v1", "--agent", "novice", "--episodes", "10", "--out", out)
+    with pq.ParquetFile(out) as file:
+        rows = [file.metadata.row_group(at).num_rows for at in range(file.num_row_groups)]
+    assert rows == [4, 4, 2]
+    played = rollout("CartPole-v1", "novice", episodes=10, keep_steps=False)
+    pd.testing.assert_frame_equal(pd.read_parquet(out), played.to_frame())
+
+
+def test_ablations_and_learners_of_a_cluster_are_those_of_one_machine(run, cart_rules, tmp_path):
+    command = ("ablate", "--env", "CartPole-v1", "--agent", "novice", "--rules", cart_rules)
+    command += ("--episodes", "4", "--most", "3", "--json")
+    assert json.loads(run(*command, "--cluster", "local:2")) == json.loads(run(*command))
+    learn = ("learn", "--env", "CartPole-v1", "--arm", "none", "--steps", "600", "--seeds", "2")
+    learn += ("--episodes", "2")
+    run(*learn, "--out", tmp_path / "here")
+    run(*learn, "--cluster", "local:2", "--out", tmp_path / "there")
+    names = ["curves.csv", "policies/none-0.npz", "policies/none-1.npz"]
+    for name in names:
+        assert (tmp_path / "there" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
+    # What is finished there is taken up here, and nothing learns anew.
+    before = (tmp_path / "there" / names[1]).stat().st_mtime_ns
+    run(*learn[:-2], "--episodes", "2", "--out", tmp_path / "there")
+    assert (tmp_path / "there" / names[1]).stat().st_mtime_ns == before
+
+
+def test_aggregation_on_a_cluster_is_that_of_one_machine(run, tmp_path):
+    command = ("aggregate", DATA / "cartpole.parquet", "--max-rules", "3", "--rounds", "2")
+    command += ("--episodes", "2", "--validation", "4", "--report-episodes", "4")
+    here, there = tmp_path / "here.json", tmp_path / "there.json"
+    run(*command, "--out", here)
+    run(*command, "--cluster", "local:2", "--out", there)
+    assert RuleSet.load(there).digest == RuleSet.load(here).digest
+    cards = [json.loads(path.with_suffix(".card.json").read_text()) for path in (here, there)]
+    assert cards[0]["rounds"] == cards[1]["rounds"]
+    assert "--cluster" not in cards[1]["command"]

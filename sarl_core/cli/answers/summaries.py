@@ -410,14 +410,18 @@ def print_episodes(
 
     summary = document["summary"]
     terminal.print_lines([title])
-    rows = document["episodes"]
-    terminal.print_table(_columns(rows), [_episode(row, _columns(rows)) for row in rows])
+    if "file" in document:
+        terminal.print_lines([f"Wrote {document['file']}: {document['count']:,} episodes"])
+    rows = document.get("episodes", [])
+    count = document.get("count", len(rows))
+    if rows:
+        terminal.print_table(_columns(rows), [_episode(row, _columns(rows)) for row in rows])
     interval = f"95 % interval {summary['iqm_low']:.2f} to {summary['iqm_high']:.2f}"
     terminal.print_facts(
         [
             ("mean return", f"{summary['mean']:.2f} (standard deviation {summary['std']:.2f})"),
             ("IQM of the returns", f"{summary['iqm']:.2f} ({interval})"),
-            *safety_facts(summary, len(document["episodes"]), env_id, shielded=shield is not None),
+            *safety_facts(summary, count, env_id, shielded=shield is not None),
             ("interventions", f"{share_text(summary['intervention_rate'])} of the steps"),
             *(
                 []
