@@ -6,15 +6,18 @@ also uses the client itself, which keeps what was worked out where it was worked
 
 from __future__ import annotations
 
+import atexit
 import logging
 import re
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any, ParamSpec, TypeVar
 
 from sarl_core.errors import InputError, WorkError, needing_extras, quoted
 
+VARIABLE = "SARL_CLUSTER"
+"""The environment variable that names a cluster for the jobs of a dashboard."""
 _LOCAL = re.compile(r"local:(?P<workers>\d{1,3})(?::(?P<memory>\d+(?:\.\d+)?\s*[kMGT]i?B))?")
 _SECONDS = 10  # to wait for a scheduler, and for its first worker
 
@@ -31,6 +34,7 @@ class ClusterExecutor(Executor):
         Args:
             client: A ``distributed.Client``.
         """
+        self.losses = losses()
         self._client = client
         self._executor = client.get_executor(pure=False)
 
@@ -67,6 +71,24 @@ def cluster_executor(address: str) -> Iterator[ClusterExecutor]:
     """
     with cluster(address) as client, saying_losses():
         yield ClusterExecutor(client)
+
+
+def lasting_executor(address: str) -> ClusterExecutor:
+    """The same until this program ends, as for a server.
+
+    Args:
+        address: As of `cluster`.
+
+    Returns:
+        The executor.
+
+    Raises:
+        InputError: As `cluster`.
+        WorkError: If the extra "cluster" is not installed.
+    """
+    stack = ExitStack()
+    atexit.register(stack.close)
+    return ClusterExecutor(stack.enter_context(cluster(address)))
 
 
 @contextmanager
@@ -148,19 +170,23 @@ def _require_same_package(client: Any, address: str) -> None:
             )
 
 
+def losses() -> tuple[type[Exception], ...]:
+    """What a cluster raises when it cannot go on: workers ended, or all of it did."""
+    from distributed import CancelledError, KilledWorker
+    from distributed.comm.core import CommClosedError
+
+    return KilledWorker, CommClosedError, CancelledError
+
+
 @contextmanager
 def saying_losses() -> Iterator[None]:
     """Turn what a cluster raises when it cannot go on into one sentence."""
-    from distributed import CancelledError as Cancelled
-    from distributed import KilledWorker
-    from distributed.comm.core import CommClosedError
-
     try:
         yield
-    except KilledWorker as error:
-        raise WorkError(
-            "several workers ended over the same piece of work, as when memory runs out; give them "
-            "more memory, or write smaller row groups"
-        ) from error
-    except (CommClosedError, Cancelled) as error:
+    except losses() as error:
+        if type(error).__name__ == "KilledWorker":
+            raise WorkError(
+                "several workers ended over the same piece of work, as when memory runs out; give "
+                "them more memory, or write smaller row groups"
+            ) from error
         raise WorkError("the cluster ended in the middle of the work; run again") from error

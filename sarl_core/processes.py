@@ -168,7 +168,7 @@ def completed(
                 return
             ready, _ = wait(running, timeout=_LOOK_SECONDS, return_when=FIRST_COMPLETED)
             yield [(running.pop(future), _outcome(future)) for future in ready]
-    except BrokenExecutor as error:
+    except (BrokenExecutor, *getattr(executor, "losses", ())) as error:
         raise WorkError(lost) from error
     finally:
         for future in running:

@@ -12,7 +12,9 @@ from typing import Annotated
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.options import Cost, EnvArguments, Failure, Wrappers
+from sarl_core.cli.inputs import workers_at
+from sarl_core.cli.options import ClusterAddress, Cost, EnvArguments, Failure, Wrappers
+from sarl_core.clusters import VARIABLE
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, WorkError
 
@@ -55,6 +57,7 @@ def app(
             "arguments, wrappers, failure and cost, and agents.",
         ),
     ] = None,
+    cluster: ClusterAddress = None,
 ) -> None:
     """Start the dashboard; Ctrl-C ends it.
 
@@ -63,6 +66,16 @@ def app(
     script = _script()
     with terminal.working("Starting"):
         offers = _offers(env or [], env_args, wrapper or [], failure, cost, agent or [], settings)
+        if cluster is not None and cluster.startswith("local:"):
+            raise InputError(
+                "a dashboard works in processes of this machine anyway; give the address of a "
+                "scheduler, or leave --cluster out"
+            )
+        if cluster is not None:
+            with workers_at(
+                cluster
+            ):  # one that cannot be reached is said here, and not to visitors
+                offers[VARIABLE] = cluster
     terminal.print_lines([f"The dashboard is at http://localhost:{port} (Ctrl-C ends it)."])
     sys.stdout.flush()
     command = [sys.executable, "-m", "streamlit", "run", str(script), "--server.port", str(port)]

@@ -27,6 +27,7 @@ POPULATION = 20  # neighbours a generation
 # How far each number goes at first, in units of half the spread of a feature where it is asked
 # about.
 FIRST_STEP = 0.15
+_WIDE_STEP, _FEW = 0.6, 4  # of so few numbers, which one generation can look for everywhere
 _LEAST_STEP = 0.01
 _WIDER = 1.5  # times, where all neighbours do alike
 _MANY = 120  # numbers to move: of more, which move together takes longer to learn than there is
@@ -138,14 +139,14 @@ class Movement:
         Args:
             trees: One an action dimension, counted over `pairs`.
             pairs: That say how widely features are spread.
-            step: How far each number goes at first.
+            step: How far each number goes at first; of few numbers farther.
             seed: Another one gives another way.
         """
         self._parameters = Parameters.of(trees, pairs)
         self.count = self._parameters.count
         self.here = self._parameters.candidate(np.zeros(self.count))
-        self._begun = step
-        self._strategy = _evolution_strategy(self.count, step, seed) if self.count else None
+        self._begun = _WIDE_STEP if self.count <= _FEW else step
+        self._strategy = _evolution_strategy(self.count, self._begun, seed) if self.count else None
         self._points: list[NDArray[np.float64]] = []
 
     @property

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 
 import streamlit as st
 
-from sarl_core.processes import Processes
 from sarl_core.rollouts.tasks import run_tasks
 from sarl_core.studies.ablation import Ablation
 from sarl_core.studies.ablation_run import AblationRecord
@@ -60,7 +60,7 @@ def _ablate(
     job: Job[AblationRecord],
     wanted: Wanted,
     cache: BoundedCache[AblationRecord],
-    executor: Processes,
+    executor: Executor,
 ) -> None:
     row = wanted.row
     record = cache.get(row.key)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -22,7 +23,6 @@ from sarl_core.agents.agent import Agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import SarlError
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.processes import Processes
 from sarl_core.rollouts.episodes import Episodes, join
 from sarl_core.rollouts.player import check_environment
 from sarl_core.rollouts.tasks import Task, run_tasks
@@ -191,7 +191,7 @@ def run_batch(rows: Sequence[Row], episodes: int) -> Job[EpisodeBatch]:
 
 
 def _run(
-    job: Job[EpisodeBatch], batch: EpisodeBatch, known_episodes: Results, executor: Processes
+    job: Job[EpisodeBatch], batch: EpisodeBatch, known_episodes: Results, executor: Executor
 ) -> None:
     def count(row: Row) -> int:
         have = known_episodes.get(row.key, batch.episodes)

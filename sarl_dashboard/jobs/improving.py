@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -28,7 +29,7 @@ from sarl_core.library.items import Kind
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.processes import Processes
+from sarl_core.processes import workers_of
 from sarl_dashboard.cache import key_of
 from sarl_dashboard.jobs.episodes import AgentMaker
 from sarl_dashboard.jobs.job import Job
@@ -203,7 +204,7 @@ class _ImprovementRun:
 
     job: Job[Outcome]
     order: ImprovementOrder
-    executor: Processes
+    executor: Executor
     began: float
     rounds: tuple[AggregationRound, ...] = ()
 
@@ -228,7 +229,7 @@ class _ImprovementRun:
             order.plan,
             env_id=order.env_id,
             expert=order.expert(),
-            jobs=self.executor.workers,
+            jobs=workers_of(self.executor),
             executor=self.executor,
             progress=progress,
             watch=watch,
@@ -252,7 +253,7 @@ class _ImprovementRun:
             order.rules,
             episodes=order.plan.episodes,
             seed=order.plan.seed,
-            jobs=self.executor.workers,
+            jobs=workers_of(self.executor),
             executor=self.executor,
             progress=progress,
         ):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pandas as pd
@@ -11,6 +12,8 @@ import pytest
 
 from sarl_core import RuleSet, rollout
 from sarl_core.cli.app import main
+from sarl_core.clusters import cluster
+from sarl_core.processes import run_each
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "demonstrations"
 LANDER = DATA / "lunar_lander.parquet"
@@ -188,3 +191,28 @@ def test_aggregation_on_a_cluster_is_that_of_one_machine(run, tmp_path):
     cards = [json.loads(path.with_suffix(".card.json").read_text()) for path in (here, there)]
     assert cards[0]["rounds"] == cards[1]["rounds"]
     assert "--cluster" not in cards[1]["command"]
+
+
+@pytest.mark.parametrize(
+    ("address", "sentence"),
+    [
+        ("local:2", "a dashboard works in processes of this machine anyway"),
+        ("tcp://127.0.0.1:9", "no scheduler answers at 'tcp://127.0.0.1:9'"),
+    ],
+)
+def test_a_dashboard_is_not_started_with_a_cluster_that_is_none(address, sentence, capsys):
+    assert main(["app", "--cluster", address]) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_jobs_of_a_dashboard_are_done_on_the_cluster_of_its_owner(monkeypatch):
+    from sarl_dashboard.jobs.processes import processes
+
+    with cluster("local:1") as owner:
+        monkeypatch.setenv("SARL_CLUSTER", owner.scheduler.address)
+        processes.clear()
+        try:
+            there = run_each(os.getpid, [()], executor=processes())
+            assert there == list(owner.run(os.getpid).values())
+        finally:
+            processes.clear()
