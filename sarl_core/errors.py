@@ -15,7 +15,6 @@ _EXTRAS = {
     "streamlit": "dashboard",
     "stable_baselines3": "learning",
     "torch": "learning",
-    "sklearnex": "large",
     "distributed": "cluster",
     "imageio": "video",
     "imageio_ffmpeg": "video",

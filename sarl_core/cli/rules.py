@@ -234,7 +234,7 @@ def mine(
     else:
         print_oddities(oddities)
         print_rules(rule_set, out, tried, judged)
-        print_learner(learner, trees)
+        print_learner(trees)
 
 
 def _mine_at_a_distance(
@@ -334,7 +334,7 @@ def _mine_at_a_distance(
     else:
         print_notes(notes)
         print_rules(rule_set, out, tried, elsewhere="--hold-out")
-        print_learner("auto", mined.trees)
+        print_learner(mined.trees)
 
 
 @with_environment
@@ -411,5 +411,5 @@ def landscape(
             f"rules, from {'a tree' if len(trees) == 1 else 'trees'} of {grown} nodes."
         ]
     )
-    print_learner(learner, trees)
+    print_learner(trees)
     print_notes(notes)

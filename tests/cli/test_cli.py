@@ -14,7 +14,6 @@ from PIL import Image
 
 from sarl_core import RuleSet, grow_policy_trees, load_demonstrations, mine_rules
 from sarl_core.cli.app import main
-from sarl_core.explaining.words import growth as growth_words
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.growing import growth
 
@@ -420,14 +419,10 @@ def test_mine_grows_trees_by_the_learner_that_is_named(run, tmp_path):
     )
 
 
-def test_mine_says_that_many_steps_waited_for_want_of_the_other_learner(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(growth, "EXACT_UP_TO", 1_000)
-    monkeypatch.setattr(growth_words, "EXACT_UP_TO", 1_000)
+def test_mine_says_that_many_steps_had_the_other_learner(run, tmp_path, monkeypatch):
     path = tmp_path / "rules.json"
     options = ("--setting", "filtered", "--out", path)
+    assert "learner" not in run("mine", LANDER, *options)
+    monkeypatch.setattr(growth, "EXACT_UP_TO", 1_000)
     assert "histogram" in run("mine", LANDER, *options)
-    for place in (growth, growth_words):
-        monkeypatch.setattr(place, "is_installed", lambda: False)
-    answer = run("mine", LANDER, *options)
-    assert "pip install 'sarl-explorer[large]'" in " ".join(answer.split())
-    assert RuleSet.load(path).learner == "exact"
+    assert RuleSet.load(path).learner == "histogram"

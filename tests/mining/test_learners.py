@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,7 +11,6 @@ from sarl_core import (
     Demonstrations,
     InputError,
     Shield,
-    WorkError,
     grow_policy_trees,
     load_demonstrations,
     mine_rules,
@@ -244,22 +240,10 @@ def test_a_part_is_regrown_by_the_learner_of_the_tree(lander_like, monkeypatch):
     assert again.correct[again.feature == LEAF].sum() == len(lander_like)
 
 
-def test_auto_takes_the_histogram_learner_for_many_pairs_where_it_is_there(monkeypatch):
+def test_auto_takes_the_histogram_learner_for_many_pairs():
     assert learner_for("auto", growth.EXACT_UP_TO) == "exact"
     assert learner_for("auto", growth.EXACT_UP_TO + 1) == "histogram"
     assert learner_for("exact", 10**9) == "exact"
-    find = importlib.util.find_spec
-    monkeypatch.setattr(
-        histogram, "find_spec", lambda name: None if name == "sklearnex" else find(name)
-    )
-    assert learner_for("auto", 10**9) == "exact"
-
-
-def test_without_the_extra_it_says_what_to_install(lander_like, monkeypatch):
-    monkeypatch.setitem(sys.modules, "sklearnex", None)
-    monkeypatch.delitem(sys.modules, "sklearnex.ensemble", raising=False)
-    with pytest.raises(WorkError, match=r"pip install 'sarl-explorer\[large\]'"):
-        histogram_trees(lander_like)
 
 
 @pytest.mark.parametrize(

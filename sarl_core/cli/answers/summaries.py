@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from sarl_core.cli.answers.evidence import Tried
     from sarl_core.demonstrations.dataset import ActionDimension, Demonstrations
     from sarl_core.demonstrations.formats.mapping.preview import ColumnPreview
-    from sarl_core.mining.growing.growth import LearnerChoice
     from sarl_core.mining.rule_set import RuleSet
     from sarl_core.mining.tree import PolicyTree
     from sarl_core.mining.validation.cross_fitting import Judged
@@ -318,19 +317,16 @@ def describe_rules(
     }
 
 
-def print_learner(choice: LearnerChoice, trees: Sequence[PolicyTree]) -> None:
-    """Print what grew trees, where that is not what it always is.
+def print_learner(trees: Sequence[PolicyTree]) -> None:
+    """Print what grew trees, where that is not the exact learner.
 
     Args:
-        choice: That was made.
-        trees: Grown by it, of the same demonstrations.
+        trees: Of the same demonstrations.
     """
-    from sarl_core.explaining.words.growth import learner_text, missing_learner_text
+    from sarl_core.explaining.words.growth import learner_text
 
     if trees[0].learner != "exact":
         terminal.print_facts([("learner", learner_text(trees[0].learner))])
-    missing = missing_learner_text(choice, trees[0].source.steps)
-    terminal.print_lines([f"note: {missing}"] if missing else [])
 
 
 def print_rules(

@@ -35,25 +35,24 @@ def bin_piece(
     rows = placement.placed(read_piece(piece, reading), piece.file)
     mined = ~np.isin(rows.episodes, placement.held_out)
     states, actions = rows.observations[mined], rows.action_columns[mined]
-    bins = np.empty(states.shape, dtype=np.uint16, order="F")
+    bins = np.empty(states.shape[::-1], dtype=np.uint16)
     for feature, own in enumerate(borders):
         # As a tree compares: float32 with float64; what is no number is at most no border.
-        bins[:, feature] = np.searchsorted(own, states[:, feature].astype(np.float64))
+        bins[feature] = np.searchsorted(own, states[:, feature].astype(np.float64))
     labels = np.stack(
         [
             dimension.labels_of(actions[:, index])
             for index, dimension in enumerate(label_dimensions(rows, divider))
-        ],
-        axis=1,
+        ]
     )
     return BinnedRows(bins, labels.astype(np.uint16))
 
 
 def label_counts(rows: BinnedRows, labels: int) -> NDArray[np.int64]:
     """Rows of each label in each action dimension, (m, labels)."""
-    return np.stack([np.bincount(column, minlength=labels) for column in rows.labels.T])
+    return np.stack([np.bincount(column, minlength=labels) for column in rows.labels])
 
 
 def bin_counts(rows: BinnedRows, bins: int) -> NDArray[np.int64]:
     """Rows in each bin of each feature, (d, bins)."""
-    return np.stack([np.bincount(column, minlength=bins) for column in rows.bins.T])
+    return np.stack([np.bincount(column, minlength=bins) for column in rows.bins])

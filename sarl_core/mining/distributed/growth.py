@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from sarl_core.mining.distributed.histograms import (
     NOWHERE,
-    BestQueries,
     Queries,
     added,
     at_root,
@@ -28,6 +27,7 @@ from sarl_core.mining.distributed.histograms import (
     sent_on,
     taken,
 )
+from sarl_core.mining.growing.histogram import Query
 from sarl_core.mining.growing.structure import TreeStructure
 from sarl_core.mining.tree import LEAF
 
@@ -60,8 +60,7 @@ class DistributedGrowth:
         client: A ``distributed.Client``.
         rows: The `BinnedRows` of each piece, as futures.
         counts: Rows of each label in all of them, (labels,).
-        bins: The most bins that a feature has.
-        features: How many there are.
+        bins: How many each feature has.
         dimension: Whose labels the tree is about.
         least: Rows that a node needs to be split.
         max_depth: Of the tree; None for no limit.
@@ -72,8 +71,7 @@ class DistributedGrowth:
     client: Any
     rows: Sequence[Any]
     counts: NDArray[np.int64]
-    bins: int
-    features: int
+    bins: Sequence[int]
     dimension: int = 0
     least: int = 2
     max_depth: int | None = None
@@ -129,41 +127,40 @@ class DistributedGrowth:
 
     def _chosen(self, nodes: Sequence[int], at: Sequence[Any]) -> Queries:
         """Choose the queries of some nodes, and make their children."""
-        labels = len(self.counts)
-        together = max(1, _COUNTS // (self.features * self.bins * labels))
-        chosen = []
+        labels, bins = len(self.counts), max(self.bins)
+        together = max(1, _COUNTS // (len(self.bins) * bins * labels))
+        chosen: list[Query | None] = []
         for start in range(0, len(nodes), together):
             wanted = np.array(nodes[start : start + together], dtype=np.int64)
             parts = [
-                self.client.submit(
-                    histogram, rows, where, wanted, (self.bins, labels), self.dimension
-                )
+                self.client.submit(histogram, rows, where, wanted, (labels, bins), self.dimension)
                 for rows, where in zip(self.rows, at, strict=True)
             ]
             total = added_up(self.client, parts)
-            chosen.append(self.client.submit(best_queries, total).result())
-        best = BestQueries(
-            *(
-                np.concatenate([getattr(one, name) for one in chosen])
-                for name in ("feature", "border", "left", "right")
-            )
-        )
-        split = np.flatnonzero(best.feature != LEAF)
-        for place in split.tolist():
-            node = self._nodes[nodes[place]]
-            node.feature, node.border = int(best.feature[place]), int(best.border[place])
+            chosen += self.client.submit(best_queries, total).result()
+        split: list[tuple[int, Query]] = []
+        for number, query in zip(nodes, chosen, strict=True):
+            if query is None:
+                continue
+            node = self._nodes[number]
+            node.feature, node.border = query.feature, query.border
             node.left, node.right = len(self._nodes), len(self._nodes) + 1
             self._nodes += [
-                _Node(counts[place], node.depth + 1) for counts in (best.left, best.right)
+                _Node(counts, node.depth + 1) for counts in (query.left, node.counts - query.left)
             ]
-        some = np.array(nodes, dtype=np.int64)[split]
+            split.append((number, query))
 
         def children(side: str) -> NDArray[np.int64]:
-            below = [getattr(self._nodes[one], side) for one in some.tolist()]
-            return np.array([one if self._is_split(one) else NOWHERE for one in below])
+            below = [getattr(self._nodes[number], side) for number, _ in split]
+            ends = [one if self._is_split(one) else NOWHERE for one in below]
+            return np.array(ends, dtype=np.int64)
 
         return Queries(
-            some, best.feature[split], best.border[split], children("left"), children("right")
+            np.array([number for number, _ in split], dtype=np.int64),
+            np.array([query.feature for _, query in split], dtype=np.int64),
+            np.array([query.border for _, query in split], dtype=np.int64),
+            children("left"),
+            children("right"),
         )
 
     def _grow_parts(self, small: Sequence[int], at: Sequence[Any]) -> None:
@@ -184,6 +181,7 @@ class DistributedGrowth:
                     self.least,
                     self.seed,
                     self.dimension,
+                    self.bins,
                     *(self.client.submit(operator.getitem, one, place) for one in handed),
                 )
                 for place, group in enumerate(groups)

@@ -125,8 +125,8 @@ def mine_on_cluster(
         dimensions = label_dimensions(mined, plan.divider)
         most = max(one.n_labels for one in dimensions)
         labels = added_up(client, [client.submit(label_counts, one, most) for one in rows]).result()
-        bins = max(map(len, borders)) + 1
-        counted = added_up(client, [client.submit(bin_counts, one, bins) for one in rows])
+        bins = [len(own) + 1 for own in borders]
+        counted = added_up(client, [client.submit(bin_counts, one, max(bins)) for one in rows])
         steps = int(labels[0].sum())
         structures = []
         for index, dimension in enumerate(dimensions):
@@ -135,7 +135,6 @@ def mine_on_cluster(
                 rows,
                 labels[index, : dimension.n_labels],
                 bins,
-                len(borders),
                 dimension=index,
                 least=math.ceil(plan.min_support * steps),
                 max_depth=plan.max_depth,

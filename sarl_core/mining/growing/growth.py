@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError, quoted, require
 from sarl_core.mining.growing.exact import exact_structure
-from sarl_core.mining.growing.histogram import BinnedStates, histogram_structure, is_installed
+from sarl_core.mining.growing.histogram import BinnedStates, histogram_structure
 from sarl_core.mining.growing.structure import TreeStructure, count_tree, tree_levels
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.tree import LEAF, Learner, PolicyTree
@@ -29,7 +29,7 @@ def learner_for(choice: LearnerChoice, pairs: int) -> Learner:
 
     Args:
         choice: A learner, or "auto": up to `EXACT_UP_TO` pairs the exact one, then the histogram
-            learner, where the extra "large" is installed.
+            learner.
         pairs: How many.
 
     Returns:
@@ -44,7 +44,7 @@ def learner_for(choice: LearnerChoice, pairs: int) -> Learner:
         )
     if choice != "auto":
         return choice
-    return "histogram" if pairs > EXACT_UP_TO and is_installed() else "exact"
+    return "histogram" if pairs > EXACT_UP_TO else "exact"
 
 
 def grow_policy_trees(
@@ -70,7 +70,7 @@ def grow_policy_trees(
             case. A leaf that no border between bins parts better stays mixed.
         min_support: No node with less support is split further: no rule at that minimum support,
             or a higher one, needs it. Rules at a lower one are not those of fully grown trees.
-            The histogram learner then takes half of the time, and may choose otherwise among
+            The histogram learner then takes a part of the time, and may choose otherwise among
             equally good queries than it does without.
 
     Returns:
@@ -78,7 +78,6 @@ def grow_policy_trees(
 
     Raises:
         InputError: If the divider, the depth, the learner or the support is none.
-        WorkError: If the histogram learner is wanted and the extra "large" not installed.
     """
     must = "what trees are grown from must be Demonstrations"
     require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
@@ -101,10 +100,12 @@ def grow_policy_trees(
             histogram_structure(bins, column, least=least, max_depth=max_depth, seed=seed)
             for column in labels
         ]
-        del bins  # as large as the states are, and counting needs room, too
+        del bins  # half as large as the states are, and counting needs room, too
         return tuple(
-            count_tree(structure, demonstrations, index, divider=divider, learner=chosen)
-            for index, structure in enumerate(structures)
+            count_tree(
+                structure, demonstrations, index, divider=divider, learner=chosen, leaves=leaves
+            )
+            for index, (structure, leaves) in enumerate(structures)
         )
 
     def grown(index: int) -> PolicyTree:
@@ -141,7 +142,7 @@ def part_of_tree(
         Its queries.
     """
     if learner == "histogram" and len(labels) > EXACT_UP_TO:
-        return histogram_structure(BinnedStates.of(observations), labels, max_depth=max_depth)
+        return histogram_structure(BinnedStates.of(observations), labels, max_depth=max_depth)[0]
     return exact_structure(observations, labels, max_depth=max_depth)
 
 

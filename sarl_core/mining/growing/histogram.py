@@ -1,33 +1,35 @@
 """CART over bins: where there are many states, borders of a thousand bins are as good as all.
 
-A feature's values become the numbers of bins that hold about as many states each, and a forest of
-one tree is grown over those. With fewer values than bins every border between two of them is one.
-What is between two bins is a threshold of the states themselves, so the tree asks about those.
+A feature's values become the numbers of bins that hold about as many states each. At a node, states
+are counted by feature, label and bin, which says at once what every border between two bins would
+part; of the two nodes below, the larger one has what the smaller one has not. Few states have no
+use for a thousand bins, so neighbouring ones are taken together, and where very few are left,
+sorting them is faster than counting. With fewer values than bins every border between two of them
+is one. What is between two bins is a threshold of the states, so the tree asks about those.
 """
 
 from __future__ import annotations
 
-import warnings
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from importlib.util import find_spec
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.requirements import LARGEST
-from sarl_core.errors import needing_extras
-from sarl_core.mining.growing.structure import TreeStructure
+from sarl_core.mining.growing.exact import fitted
+from sarl_core.mining.growing.structure import TreeStructure, tree_levels
 from sarl_core.mining.tree import LEAF
 
 BINS = 1_024
-"""Of a feature, at most."""
-_MOST_BINS = 64 * BINS  # the bins are made: the learner is to throw none of them together
-
-
-def is_installed() -> bool:
-    """Whether what grows such trees is there (the extra "large")."""
-    return find_spec("sklearnex") is not None
+"""Of a feature, at most; a power of two."""
+_FEWEST_BINS = 32
+_STATES_A_BIN = 4  # of a node, at least, before neighbouring bins are taken together
+_SORTED = 500  # states that are sorted rather than counted, where many nodes are to come of them
+_MANY_NODES = 8
+_AT_ONCE = 30_000  # states whose features are counted in one go: of more, a feature fills the cache
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,12 +37,12 @@ class BinnedStates:
     """States as numbers of bins, which serve the trees of all action dimensions.
 
     Attributes:
-        numbers: The bin of each value, (N, d) float32, as the learner reads them.
+        numbers: The bin of each value, (d, N) uint16.
         borders: For each feature what lies between two bins, ascending, float64: a value is in
             bin 0 where it is at most the first.
     """
 
-    numbers: NDArray[np.float32]
+    numbers: NDArray[np.uint16]
     borders: tuple[NDArray[np.float64], ...]
 
     @classmethod
@@ -55,7 +57,7 @@ class BinnedStates:
         """
         from loky import cpu_count
 
-        numbers = np.empty(observations.shape, dtype=np.float32)
+        numbers = np.empty(observations.shape[::-1], dtype=np.uint16)
 
         def bin_feature(index: int) -> NDArray[np.float64]:
             # A formula may be infinite, and thresholds lie below the limit; NaN is at most none.
@@ -65,13 +67,57 @@ class BinnedStates:
             ascending = values[order]
             ends = _bin_ends(ascending)
             sizes = np.diff(ends, prepend=0, append=len(values))
-            numbers[order, index] = np.repeat(np.arange(len(sizes)), sizes)
+            numbers[index, order] = np.repeat(np.arange(len(sizes), dtype=np.uint16), sizes)
             # Exact, and strictly between the two: float64 has more than twice the digits.
             return (ascending[ends - 1].astype(np.float64) + ascending[ends]) / 2
 
         with ThreadPoolExecutor(cpu_count()) as threads:  # sorting and searching let others run
             borders = tuple(threads.map(bin_feature, range(observations.shape[1])))
         return cls(numbers, borders)
+
+
+class Query(NamedTuple):
+    """What a node asks.
+
+    Attributes:
+        feature: Of which.
+        border: A state goes left whose bin is at most this.
+        left: States of each label that go left, (labels,).
+    """
+
+    feature: int
+    border: int
+    left: NDArray[np.int64]
+
+
+def best_query(counts: NDArray[np.int64]) -> Query | None:
+    """Choose a query, as CART does by Gini's impurity; of equals the first feature and border.
+
+    Args:
+        counts: States of a node by feature, label and bin, (d, labels, bins).
+
+    Returns:
+        None where no border parts them.
+    """
+    bins = counts.shape[2]
+    if bins < 2:
+        return None
+    total = counts[0].sum(axis=1)
+    below = counts.cumsum(axis=2)[:, :, :-1]
+    n_below = below.sum(axis=1)
+    n_above = total.sum() - n_below
+    left = below.astype(np.float64)
+    right = total.astype(np.float64)[:, None] - left
+    # The impurity that is left is the number of states less this.
+    purity = np.einsum("dlb,dlb->db", left, left) / np.maximum(n_below, 1)
+    purity += np.einsum("dlb,dlb->db", right, right) / np.maximum(n_above, 1)
+    purity[(n_below == 0) | (n_above == 0)] = -1.0
+    feature, first = divmod(int(purity.argmax()), bins - 1)
+    if purity[feature, first] < 0.0:
+        return None
+    # Between two bins that hold states there may be empty ones: the border is in their middle.
+    last = int(np.searchsorted(n_below[feature], n_below[feature, first], side="right")) - 1
+    return Query(feature, (first + last) // 2, below[feature, :, first])
 
 
 def histogram_structure(
@@ -81,51 +127,252 @@ def histogram_structure(
     least: int = 2,
     max_depth: int | None = None,
     seed: int = 0,
-) -> TreeStructure:
+) -> tuple[TreeStructure, NDArray[np.int64]]:
     """Grow a tree of which each query asks about a border between two bins.
 
     Args:
         bins: Of N states.
         labels: Shape (N,).
         least: States that a node needs to be split.
-        max_depth: Of the tree; None grows it fully: a leaf is pure, holds two states, or no border
-            between bins parts its labels better.
-        seed: For choosing among equally good queries.
+        max_depth: Of the tree; None grows it fully: a leaf is pure, or no border between bins
+            parts its states.
+        seed: For choosing among equally good queries of few states.
 
     Returns:
-        Its queries.
-
-    Raises:
-        WorkError: If the extra "large" is not installed.
+        Its queries, each left part before the right one; and the leaf of each state, (N,).
     """
-    with needing_extras():
-        from sklearnex.ensemble import RandomForestClassifier
-
-    forest = RandomForestClassifier(
-        n_estimators=1,
-        bootstrap=False,
-        max_features=None,
-        min_samples_split=max(2, least),
-        max_depth=max_depth,
-        max_bins=_MOST_BINS,
-        random_state=seed,
+    counts = [len(borders) + 1 for borders in bins.borders]
+    structure, leaves = binned_structure(
+        bins.numbers, counts, labels, least=least, max_depth=max_depth, seed=seed
     )
-    # Beside the main thread it takes all cores, which is what it does in it, too, and warns.
-    warnings.filterwarnings("ignore", "'Threading' parallel backend is not supported", UserWarning)
-    tree = forest.fit(bins.numbers, labels).estimators_[0].tree_
-    left = np.asarray(tree.children_left, dtype=np.int64)
-    feature = np.where(left == LEAF, LEAF, tree.feature).astype(np.int64)
-    # Where no state of a node lies in a bin, the border before it parts the same as that behind.
-    border = np.floor(tree.threshold).astype(np.int64)
-    threshold = np.zeros(len(left))
+    threshold = np.zeros(len(structure.feature))
     for index, borders in enumerate(bins.borders):
-        threshold[feature == index] = borders[border[feature == index]]
-    return TreeStructure(
-        feature=feature,
-        threshold=threshold,
-        children_left=left,
-        children_right=np.asarray(tree.children_right, dtype=np.int64),
-    )
+        here = structure.feature == index
+        threshold[here] = borders[structure.threshold[here].astype(np.int64)]
+    return replace(structure, threshold=threshold), leaves
+
+
+def binned_structure(
+    numbers: NDArray[np.uint16],
+    counts: Sequence[int],
+    labels: NDArray[np.int64],
+    *,
+    least: int = 2,
+    max_depth: int | None = None,
+    seed: int = 0,
+) -> tuple[TreeStructure, NDArray[np.int64]]:
+    """The same of bins alone, whose borders are whole numbers.
+
+    Args:
+        numbers: The bin of each value, (d, N).
+        counts: How many bins each feature has, d numbers, at most `BINS`.
+        labels: Shape (N,).
+        least: As of `histogram_structure`.
+        max_depth: Likewise.
+        seed: Likewise.
+
+    Returns:
+        As `histogram_structure`; a state goes left whose bin is at most the threshold.
+    """
+    from loky import cpu_count
+
+    # scikit-learn, which sorts, lets other threads run.
+    with ThreadPoolExecutor(cpu_count()) as threads:
+        growth = _Growth(threads, max(2, least), max_depth, seed)
+        return growth.grow(numbers, counts, labels)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """The states of a node that may be split.
+
+    Attributes:
+        node: Its number.
+        depth: Queries above it.
+        rows: The states, (n,).
+        keys: Of each feature, label * `BINS` + bin, (d, n).
+        counts: By feature, label and bin; None where they were not counted yet.
+    """
+
+    node: int
+    depth: int
+    rows: NDArray[np.int64]
+    keys: NDArray[np.unsignedinteger]
+    counts: NDArray[np.int64] | None = None
+
+
+@dataclass
+class _Growth:
+    """A tree while it grows; nodes have numbers in the order in which they were made."""
+
+    threads: ThreadPoolExecutor
+    least: int
+    max_depth: int | None
+    seed: int
+    labels: int = 1
+    spread: NDArray[np.uint16] = field(default_factory=lambda: np.zeros(0, dtype=np.uint16))
+    feature: list[int] = field(default_factory=lambda: [LEAF])
+    border: list[float] = field(default_factory=lambda: [0.0])
+    left: list[int] = field(default_factory=lambda: [LEAF])
+    right: list[int] = field(default_factory=lambda: [LEAF])
+
+    def grow(
+        self, numbers: NDArray[np.uint16], counts: Sequence[int], labels: NDArray[np.int64]
+    ) -> tuple[TreeStructure, NDArray[np.int64]]:
+        """Grow it over states, (d, N), with so many bins, d, and these labels, (N,)."""
+        present, labels = np.unique(labels, return_inverse=True)
+        self.labels = len(present)
+        # Bins of a feature with few values lie far apart, so that they stay apart when others are
+        # taken together.
+        self.spread = np.log2(BINS // np.array(counts)).astype(np.uint16)
+        kind = np.uint16 if self.labels * BINS <= 2**16 else np.uint32
+        keys = np.left_shift(numbers, self.spread[:, None], dtype=kind)
+        keys += (labels * BINS).astype(kind)
+        leaves = np.zeros(len(labels), dtype=np.int64)
+        waiting = [_Part(0, 0, np.arange(len(labels)), keys)] if len(labels) else []
+        del keys
+        sorted_parts: list[tuple[_Part, Future[tuple[TreeStructure, NDArray[np.int64]]]]] = []
+        while waiting:
+            part = waiting.pop()
+            leaves[part.rows] = part.node
+            if not self._is_split(part):
+                continue
+            if self.least * _MANY_NODES <= len(part.rows) <= _SORTED:
+                small = replace(part, counts=None)
+                sorted_parts.append((small, self.threads.submit(self._sorted, small)))
+            else:
+                waiting += self._split(part)
+        for part, future in sorted_parts:
+            self._take(part, *future.result(), leaves)
+        return self._in_order(leaves)
+
+    def _is_split(self, part: _Part) -> bool:
+        if len(part.rows) < self.least or part.depth == self.max_depth:
+            return False
+        labels = part.keys[0] // BINS
+        return bool((labels != labels[0]).any())
+
+    def _split(self, part: _Part) -> list[_Part]:
+        """Choose a query and make two nodes; none where no border parts the states."""
+        bins = BINS
+        while bins > _FEWEST_BINS and bins * _STATES_A_BIN > len(part.rows):
+            bins //= 2
+        counts = self._counted(part, bins)
+        query = best_query(counts)
+        if query is None and bins < BINS:
+            bins = BINS
+            counts = self._counted(replace(part, counts=None), bins)
+            query = best_query(counts)
+        if query is None:
+            return []
+        # The last of the bins that were taken together, and of those that were spread.
+        border = (query.border + 1) * (BINS // bins) - 1
+        goes_left = part.keys[query.feature] % BINS <= border
+        self.feature[part.node] = query.feature
+        self.border[part.node] = border >> int(self.spread[query.feature])
+        below = []
+        for side, inside in ((self.left, goes_left), (self.right, ~goes_left)):
+            side[part.node] = len(self.feature)
+            self.feature.append(LEAF)
+            self.border.append(0.0)
+            self.left.append(LEAF)
+            self.right.append(LEAF)
+            some = np.flatnonzero(inside)
+            below.append(
+                _Part(
+                    side[part.node], part.depth + 1, part.rows[some], part.keys.take(some, axis=1)
+                )
+            )
+        smaller, larger = sorted(below, key=lambda one: len(one.rows))
+        if len(larger.rows) > _AT_ONCE:  # of fewer, counting is as fast
+            few = self._counted(smaller, bins)
+            below = [replace(smaller, counts=few), replace(larger, counts=counts - few)]
+        return below
+
+    def _counted(self, part: _Part, bins: int) -> NDArray[np.int64]:
+        """The states of a node by feature, label and bin, (d, labels, bins)."""
+        d, n = part.keys.shape
+        if part.counts is not None:
+            together = part.counts.shape[2] // bins
+            if together == 1:
+                return part.counts
+            return np.asarray(part.counts.reshape(d, self.labels, bins, together).sum(axis=3))
+        size = self.labels * bins
+        keys = part.keys if bins == BINS else part.keys // (BINS // bins)
+        if n > _AT_ONCE:
+            counts = np.stack([np.bincount(column, minlength=size) for column in keys])
+        else:
+            places = keys.astype(np.int64)
+            places += (np.arange(d) * size)[:, None]
+            counts = np.bincount(places.reshape(-1), minlength=d * size)
+        return np.asarray(counts.reshape(d, self.labels, bins))
+
+    def _sorted(self, part: _Part) -> tuple[TreeStructure, NDArray[np.int64]]:
+        """What stands below a node of few states, and the leaf of each."""
+        from sklearn.tree import DecisionTreeClassifier
+
+        bins = (part.keys % BINS >> self.spread[:, None]).T.astype(np.float32)
+        learner = DecisionTreeClassifier(
+            max_depth=None if self.max_depth is None else self.max_depth - part.depth,
+            min_samples_split=self.least,
+            random_state=self.seed,
+        )
+        below = fitted(learner, bins, part.keys[0] // BINS)
+        below = replace(below, threshold=np.floor(below.threshold))
+        return below, below.apply(bins)
+
+    def _take(
+        self,
+        part: _Part,
+        below: TreeStructure,
+        reached: NDArray[np.int64],
+        leaves: NDArray[np.int64],
+    ) -> None:
+        """Put a part that was sorted where its node is."""
+        n = len(below.feature)
+        # Its root is that node; the others stand at the end.
+        place = np.concatenate([[part.node], len(self.feature) + np.arange(n - 1)])
+        leaves[part.rows] = place[reached]
+
+        def children(own: NDArray[np.int64]) -> list[int]:
+            return [LEAF if one == LEAF else int(place[one]) for one in own.tolist()]
+
+        for column, values in (
+            (self.feature, below.feature.tolist()),
+            (self.left, children(below.children_left)),
+            (self.right, children(below.children_right)),
+        ):
+            column[part.node] = values[0]
+            column += values[1:]
+        self.border[part.node] = float(below.threshold[0])
+        self.border += below.threshold[1:].tolist()
+
+    def _in_order(self, leaves: NDArray[np.int64]) -> tuple[TreeStructure, NDArray[np.int64]]:
+        """Nodes with the numbers of one who goes down the left side first."""
+        left, right = np.array(self.left), np.array(self.right)
+        levels = tree_levels(left, right)
+        size = np.ones(len(left), dtype=np.int64)
+        place = np.zeros(len(left), dtype=np.int64)
+        for level in reversed(levels):
+            inner = level[left[level] != LEAF]
+            size[inner] += size[left[inner]] + size[right[inner]]
+        for level in levels:
+            inner = level[left[level] != LEAF]
+            place[left[inner]] = place[inner] + 1
+            place[right[inner]] = place[inner] + 1 + size[left[inner]]
+        order = np.argsort(place)
+
+        def children(side: NDArray[np.int64]) -> NDArray[np.int64]:
+            own = side[order]
+            return np.where(own == LEAF, LEAF, place[own])
+
+        structure = TreeStructure(
+            np.array(self.feature, dtype=np.int64)[order],
+            np.array(self.border, dtype=np.float64)[order],
+            children(left),
+            children(right),
+        )
+        return structure, place[leaves]
 
 
 def _bin_ends(ascending: NDArray[np.float32]) -> NDArray[np.int64]:

@@ -49,6 +49,7 @@ def count_tree(
     *,
     divider: int,
     learner: Learner = "exact",
+    leaves: NDArray[np.int64] | None = None,
 ) -> PolicyTree:
     """Send demonstrations down a tree and count what the expert did at every node.
 
@@ -58,6 +59,7 @@ def count_tree(
         index: Which action dimension.
         divider: Number of intervals of continuous dimensions.
         learner: What chose the queries.
+        leaves: The leaf that each pair reaches, (N,), where that is known.
 
     Returns:
         The tree.
@@ -67,7 +69,8 @@ def count_tree(
     """
     dimension = label_dimensions(demonstrations, divider)[index]
     labels = dimension.labels_of(demonstrations.action_columns[:, index])
-    leaves = structure.apply(demonstrations.observations)
+    if leaves is None:
+        leaves = structure.apply(demonstrations.observations)
     # Counted here, since scikit-learn keeps fractions and the positions of the labels it saw.
     n = len(structure.feature)
     counts = np.bincount(

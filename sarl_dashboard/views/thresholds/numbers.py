@@ -7,14 +7,13 @@ from typing import Any
 import streamlit as st
 
 from sarl_core.explaining.words.cross_fit import elsewhere_text
-from sarl_core.explaining.words.growth import LEARNERS, learner_text, missing_learner_text
+from sarl_core.explaining.words.growth import LEARNERS, learner_text
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import share_text
 from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_dashboard.components.journey.words import with_words, word_help
-from sarl_dashboard.state.thresholds import chosen_learner
 
 _ELSEWHERE = "Elsewhere: in an episode that the rules were not mined from, on average."
 
@@ -62,9 +61,6 @@ def show_numbers(point: Landscape, judged: Judged | None, tree: PolicyTree | Non
                 width="content",
                 help=with_words(f"{learner_text(tree.learner).capitalize()}."),
             )
-    missing = "" if tree is None else missing_learner_text(chosen_learner(), tree.source.steps)
-    if missing:
-        st.caption(f":material/info: {missing}")
 
 
 def elsewhere(share: HeldOut | None) -> dict[str, Any]:
