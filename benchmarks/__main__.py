@@ -20,6 +20,7 @@ ROWS = {
     "tree-given": "mining.tree_given",
     "plane": "mining.plane",
     "large": "large.mining",
+    "cluster": "large.on_a_cluster",
     "combinations": "mining.combinations",
     "decision": "shielding.decision",
     "batch": "shielding.batch",
@@ -39,6 +40,7 @@ ROWS = {
     "recorder": "pages.recorder",
     "ablation": "rollouts.ablation",
     "import": "startup.imports",
+    "cold-start": "browser.cold_start",
     "intervals": "evidence.intervals",
 }
 

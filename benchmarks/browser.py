@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import statistics
+import tempfile
+import time
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
-from playwright.sync_api import Page
+from playwright.sync_api import Page, sync_playwright
 
-from benchmarks.chromium import opened
+from benchmarks.chromium import ARGUMENTS, CHROMIUM, PATIENCE, dashboard, opened
 from benchmarks.data import demonstrations
 from benchmarks.measure import Row, duration
 from sarl_core import Demonstrations, save_demonstrations
@@ -56,6 +59,31 @@ def slider(quick: bool) -> Iterable[Row]:
         page.get_by_text(f"{MANY:,} steps").first.wait_for()
         page.get_by_role("link", name="Thresholds").first.click()
         yield _row(page, f"{MANY:,} steps", moves, 0.3)
+
+
+def cold_start(quick: bool) -> Iterable[Row]:
+    """From starting the dashboard's process to the first numbers on Thresholds."""
+    times = []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        for _ in range(2 if quick else 5):
+            page = browser.new_page(viewport={"width": 1440, "height": 900})
+            page.set_default_timeout(PATIENCE)
+            with tempfile.TemporaryDirectory() as name:
+                started = time.perf_counter()
+                with dashboard(Path(name)) as address:
+                    page.goto(f"{address}/thresholds")
+                    page.get_by_test_id("stMetricValue").nth(3).wait_for()
+                    times.append(time.perf_counter() - started)
+            page.close()
+    yield Row(
+        "cold start to the first numbers on Thresholds",
+        "-",
+        "seconds",
+        statistics.median(times),
+        4.0,
+        f"median of {len(times)} starts, {duration(min(times))} to {duration(max(times))}",
+    )
 
 
 def _row(page: Page, size: str, moves: int, reach: float) -> Row:

@@ -7,6 +7,9 @@ as a fleet's recorder would.
 from __future__ import annotations
 
 import argparse
+import resource
+import tempfile
+import time
 from collections.abc import Iterable
 from functools import partial
 from pathlib import Path
@@ -21,9 +24,13 @@ from sarl_core import (
     PolicyTree,
     RuleSet,
     grow_policy_trees,
+    load_demonstrations,
     mine_rules,
     save_demonstrations,
 )
+from sarl_core.clusters import cluster
+from sarl_core.mining.distributed.mining import ClusterPlan, mine_on_cluster
+from sarl_core.mining.distributed.pieces import Reading, parquet_paths
 
 FEATURES, LABELS, STEPS = 24, 4, 1_000
 SMALLEST = 0.001
@@ -89,6 +96,46 @@ def mining(quick: bool) -> Iterable[Row]:
         )
 
 
+def on_a_cluster(quick: bool) -> Iterable[Row]:
+    """Parquet files on two Dask workers of 4 GB, against the same rows in memory."""
+    rows, limit = (1_000_000 if quick else 10_000_000), 4e9
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write_files(folder, rows, files=16)
+        paths = parquet_paths([folder])
+        plan = ClusterPlan(min_support=SMALLEST)
+        with cluster("local:2:4GB") as client:
+            started = time.perf_counter()
+            mined = mine_on_cluster(client, paths, Reading(), plan)
+            took = time.perf_counter() - started
+            peak = max(client.run(_peak).values())
+        whole = load_demonstrations(paths)
+    started = time.perf_counter()
+    (tree,) = grow_policy_trees(whole, learner="histogram", min_support=SMALLEST)
+    in_memory = time.perf_counter() - started
+    fresh = pairs(50_000, seed=1)
+    right = [
+        float((one.label[one.apply(fresh.observations)] == fresh.actions).mean())
+        for one in (*mined.trees, tree)
+    ]
+    rules = [mine_rules([one], supp_min=SMALLEST, conf_min=0.9) for one in (*mined.trees, tree)]
+    yield Row(
+        f"mining {rows:,} x {FEATURES} from files on two workers of 4 GB",
+        "a worker's 4 GB",
+        "share",
+        peak / limit,
+        1.0,
+        f"{peak / 1e9:.2f} GB at most; {duration(took)}, and {duration(in_memory)} for the trees "
+        f"alone in memory; {len(rules[0]):,} rules against {len(rules[1]):,}, accuracy "
+        f"{right[0]:.3f} against {right[1]:.3f}",
+        holds=abs(right[0] - right[1]) <= WORST,
+    )
+
+
+def _peak() -> float:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024.0
+
+
 def _grown(demonstrations: Demonstrations) -> tuple[PolicyTree, ...]:
     return grow_policy_trees(demonstrations, learner="histogram", min_support=SMALLEST)
 
@@ -106,6 +153,22 @@ def _pruned(tree: PolicyTree) -> NDArray[np.int64]:
     return stands
 
 
+def write_files(folder: Path, rows: int, *, files: int) -> None:
+    """Write pairs into Parquet files, the episodes of which are numbered through.
+
+    Args:
+        folder: Made where it is not there.
+        rows: Of all files.
+        files: How many.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for number in range(files):
+        start = rows * number // files
+        part = rows * (number + 1) // files - start
+        path = folder / f"part-{number:03d}.parquet"
+        save_demonstrations(pairs(part, seed=1_000 + number, first=start // STEPS), path)
+
+
 def main() -> None:
     """Write a folder of Parquet files."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.large", description=__doc__)
@@ -113,13 +176,7 @@ def main() -> None:
     parser.add_argument("--rows", type=int, default=10_000_000)
     parser.add_argument("--files", type=int, default=16)
     arguments = parser.parse_args()
-    arguments.folder.mkdir(parents=True, exist_ok=True)
-    for number in range(arguments.files):
-        start = arguments.rows * number // arguments.files
-        part = arguments.rows * (number + 1) // arguments.files - start
-        path = arguments.folder / f"part-{number:03d}.parquet"
-        save_demonstrations(pairs(part, seed=1_000 + number, first=start // STEPS), path)
-        print(f"wrote {path}")
+    write_files(arguments.folder, arguments.rows, files=arguments.files)
 
 
 if __name__ == "__main__":
