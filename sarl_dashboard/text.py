@@ -11,7 +11,7 @@ from sarl_core.explaining.words.markdown import markdown_text
 
 escaped = markdown_text
 # What sentences say to those who type commands: the forms on the pages do the same.
-_OPTIONS = re.compile(r"with --column .* \(on the page Demonstrations: in the form\)")
+_OPTIONS = re.compile(r"with --column .* \(on the page \w+: in the form\)")
 _IN_BRACKETS = re.compile(r" \((--missing drop, in Python [^)]*|--column [^)]*=[a-z]+)\)")
 
 # Commands and options as our own sentences name them; what a file calls something may hold signs

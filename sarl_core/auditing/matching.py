@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+import shlex
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import (
     ActionDimension,
     Demonstrations,
+    Feature,
     observed_features,
 )
 from sarl_core.demonstrations.derived import extend
@@ -67,20 +70,8 @@ def matched_log(rule_set: RuleSet, log: Demonstrations, *, called: str = "the lo
         observations = np.ascontiguousarray(observations[:, places])
     observations = extend(observations, rule_set.source.features)
     _check_units(rule_set, log, places, called)
-    names = tuple(dimension.name for dimension in log.action_dimensions)
-    order = tuple(range(len(names)))
-    _check_count(rule_set, names, called)
-    if len(names) > 1 or len(rule_set.actions) > 1:
-        lined = line_up(
-            NamedFeatures(called, names, log.env_id),
-            NamedFeatures(
-                "the rules",
-                tuple(dimension.name for dimension in rule_set.actions),
-                rule_set.source.env_id,
-            ),
-            what="action dimensions",
-        )
-        order, notes = lined.places, (*notes, *filter(None, [lined.note]))
+    order, more = _action_places(rule_set, log, called)
+    notes += more
     labels = np.empty((len(log), len(rule_set.actions)), dtype=np.int64)
     actions: NDArray[Any] = np.empty(
         labels.shape, dtype=np.float32 if rule_set.actions[0].is_interval else np.int64
@@ -98,42 +89,125 @@ def matched_log(rule_set: RuleSet, log: Demonstrations, *, called: str = "the lo
     return MatchedLog(observations, labels, actions[:, 0] if single else actions, notes)
 
 
-def _check_count(rule_set: RuleSet, names: tuple[str, ...], called: str) -> None:
-    """Refuse a log of more or fewer actions."""
+class UnmatchedNames(NamedTuple):
+    """What a person has to say of the columns of a log before rules can be held against it.
+
+    Attributes:
+        features: Of the rules, that no column is named after; of a column of words its name.
+        actions: Dimensions of the rules, likewise.
+        matched: Features of the rules that a column is named after.
+    """
+
+    features: tuple[str, ...] = ()
+    actions: tuple[str, ...] = ()
+    matched: tuple[str, ...] = ()
+
+
+def unmatched_names(rule_set: RuleSet, log: Demonstrations) -> UnmatchedNames:
+    """Say which names of rules a log lacks.
+
+    Args:
+        rule_set: The rules.
+        log: As it was read.
+
+    Returns:
+        Nothing where the log can be brought into order, by its names or as it comes.
+    """
+    features: list[str] = []
+    actions: list[str] = []
+    wanted = _columns_of(rule_set.source.features)
+    try:
+        _feature_places(rule_set, recoded(log, rule_set.source.features, called="the log"))
+    except InputError:
+        features = _lacking(wanted, _columns_of(log.observed))
+    try:
+        _action_places(rule_set, log)
+    except InputError:
+        names = [dimension.name for dimension in log.action_dimensions]
+        actions = _lacking([dimension.name for dimension in rule_set.actions], names)
+    return UnmatchedNames(tuple(features), tuple(actions), tuple(_lacking(wanted, features)))
+
+
+def _columns_of(features: Sequence[Feature]) -> list[str]:
+    """The columns that features are read from; those of one column of words are one."""
+    observed = observed_features(features)
+    columns = [one.indicator.column if one.indicator else one.name for one in observed]
+    return list(dict.fromkeys(columns))
+
+
+def _lacking(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Names that are not among others."""
+    have = plain_names(names)
+    return [name for name in wanted if plain_names([name])[0] not in have]
+
+
+def _action_places(
+    rule_set: RuleSet, log: Demonstrations, called: str = "the log"
+) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """For each action dimension of the rules its place in the log; a single one has any name."""
+    names = tuple(dimension.name for dimension in log.action_dimensions)
     theirs = tuple(dimension.name for dimension in rule_set.actions)
-    if len(names) == len(theirs):
-        return
-    joined = "or say which of its columns are one action together (--column left+right=action)"
-    raise InputError(
-        f"{called} has {counted(len(names), 'action')} ({shortened(names)}) and the rules have "
-        f"{len(theirs)} ({shortened(theirs)}); {_CURE}"
-        + (f", {joined}" if len(names) > len(theirs) else "")
-    )
+    if len(names) != len(theirs):
+        joined = "or say which of its columns are one action together (--column left+right=action)"
+        raise InputError(
+            f"{called} has {counted(len(names), 'action')} ({shortened(names)}) and the rules have "
+            f"{len(theirs)} ({shortened(theirs)}); {_CURE}"
+            + (f", {joined}" if len(names) > len(theirs) else "")
+        )
+    if len(names) == 1:
+        return (0,), ()
+    lacking = _lacking(theirs, names)
+    try:
+        lined = line_up(
+            NamedFeatures(called, names, log.env_id),
+            NamedFeatures("the rules", theirs, rule_set.source.env_id),
+            what="action dimensions",
+        )
+    except InputError as error:
+        if not lacking:
+            raise
+        raise InputError(
+            f"the rules are for {len(theirs)} actions and {called} has no {shortened(lacking)} "
+            f"({called}: {shortened(names)}); {_naming('action', lacking)}{_CURE}"
+        ) from error
+    return lined.places, tuple(filter(None, [lined.note]))
 
 
 def _feature_places(
-    rule_set: RuleSet, log: Demonstrations, called: str
+    rule_set: RuleSet, log: Demonstrations, called: str = "the log"
 ) -> tuple[list[int], tuple[str, ...]]:
     """For each feature of the rules its place in the log."""
     theirs = tuple(feature.name for feature in observed_features(rule_set.source.features))
     ours = tuple(feature.name for feature in log.observed)
-    wanted, have = plain_names(theirs), plain_names(ours)
-    missing = [name for name, plain in zip(theirs, wanted, strict=True) if plain not in have]
-    further = [name for name, plain in zip(ours, have, strict=True) if plain not in wanted]
+    missing, further = _lacking(theirs, ours), _lacking(ours, theirs)
     if len(ours) == len(theirs):
-        lined = line_up(
-            NamedFeatures(called, ours, log.env_id),
-            NamedFeatures("the rules", theirs, rule_set.source.env_id),
-        )
-        return list(lined.places), tuple(filter(None, [lined.note]))
+        try:
+            lined = line_up(
+                NamedFeatures(called, ours, log.env_id),
+                NamedFeatures("the rules", theirs, rule_set.source.env_id),
+            )
+            return list(lined.places), tuple(filter(None, [lined.note]))
+        except InputError:
+            if not missing:
+                raise
+    have = plain_names(ours)
     if missing or only_counts(ours) or only_counts(theirs) or len(set(have)) < len(have):
         lacks = f" has no {shortened(missing)}" if missing else f" has {len(ours)}"
+        columns = _lacking(_columns_of(rule_set.source.features), _columns_of(log.observed))
         raise InputError(
             f"the rules ask about {len(theirs)} features and {called}{lacks} "
-            f"(the rules: {shortened(theirs)}; {called}: {shortened(ours)}); {_CURE}"
+            f"({called}: {shortened(ours)}); {_naming('feature', columns)}{_CURE}"
         )
     note = f"{shortened(further)} of {called} is no feature of the rules and was left out"
-    return [have.index(name) for name in wanted], (note,)
+    return [have.index(name) for name in plain_names(theirs)], (note,)
+
+
+def _naming(role: Literal["feature", "action"], lacking: Sequence[str]) -> str:
+    """What to do where nothing is named after something of the rules, before another way."""
+    if not lacking:
+        return ""
+    option = shlex.quote(f"COLUMN={role} as {lacking[0]}")
+    return f"say which column is which with --column {option} (on the page Audit: in the form), or "
 
 
 def _check_units(rule_set: RuleSet, log: Demonstrations, places: list[int], called: str) -> None:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from sarl_core.auditing.growing import GrowingLog
     from sarl_core.auditing.guards import GuardCondition
     from sarl_core.demonstrations.dataset import Demonstrations
+    from sarl_core.demonstrations.formats.mapping.roles import Roles
     from sarl_core.explaining.words.sign_off import SignOff
 
 _FAILED = 3  # a condition of --fail-on holds
@@ -105,7 +106,8 @@ def audit(
 ) -> None:
     """Hold rules against a log: where they were broken, how often, and whether it drifts.
 
-    The log needs no environment. Features, actions and labels are matched by their names.
+    The log needs no environment. Features, actions and labels are matched by their names; of a
+    column with another name say what it is: `--column "v=feature as own speed"`.
 
     Example: `python -m sarl_core audit data/rules/cartpole_compact.json
     data/demonstrations/cartpole.parquet --fail-on "breaks>0.02" --out audited`
@@ -124,7 +126,9 @@ def audit(
         mined_from = (
             None
             if demonstrations is None
-            else read_demonstrations(demonstrations, None, columns, missing)
+            else read_demonstrations(
+                demonstrations, None, _said_of(demonstrations, columns), missing
+            )
         )
 
         def hold(path: Path | list[Path], steps: Demonstrations | None = None) -> Audit:
@@ -172,6 +176,15 @@ def audit(
     if stopped is not None:
         raise stopped
     _guard(held, guards)
+
+
+def _said_of(demonstrations: Path, columns: Roles) -> Roles:
+    """What was said of a log's columns, if the demonstrations have any of them."""
+    from sarl_core.demonstrations.formats import table_columns
+    from sarl_core.demonstrations.formats.mapping.roles import TOGETHER
+
+    said = {part for name in columns for part in (name, *name.split(TOGETHER))}
+    return columns if said and said.intersection(table_columns(demonstrations)) else {}
 
 
 def _followed(

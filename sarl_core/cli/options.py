@@ -205,7 +205,8 @@ _ColumnRoles = Annotated[
         "action, episode, step, reward, terminated, truncated, first, last, time or ignore; with a "
         "unit: speed=feature:m/s, t=time:ms; an amount in whole numbers: "
         "throttle=action:continuous:0:100 (bounds may be left out); numbers that are "
-        "choices: gear=action:labels. May be given several times.",
+        "choices: gear=action:labels; under another name: 'v=feature:m/s as own speed'. May be "
+        "given several times.",
     ),
 ]
 MissingName = Annotated[

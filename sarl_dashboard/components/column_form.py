@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import streamlit as st
 
+from sarl_core.auditing.matching import UnmatchedNames
 from sarl_core.demonstrations.formats import ColumnPreview, ColumnRole, preview_columns
+from sarl_core.demonstrations.formats.columns import feature_names
 from sarl_core.demonstrations.formats.mapping.joined import labels_together, never_together
-from sarl_core.demonstrations.formats.mapping.roles import TOGETHER, RoleName, roles_document
+from sarl_core.demonstrations.formats.mapping.roles import (
+    TOGETHER,
+    RoleName,
+    Roles,
+    roles_document,
+)
 from sarl_core.demonstrations.formats.registry import Content
+from sarl_core.environments.feature_order import plain_names
 from sarl_core.errors import InputError, quoted
 from sarl_core.explaining.html.column_previews import NAMELESS, column_previews_html
 from sarl_dashboard.text import escaped
@@ -31,6 +39,7 @@ _ENDS: dict[RoleName, str] = {
 }
 SINGLE_COLUMNS = {**_SINGLE, **_ENDS}
 _KINDS = {"labels": "one of several choices", "continuous": "an amount"}
+_PLURAL: dict[RoleName, str] = {"feature": "observations", "action": "actions"}
 _MOST_UNITS = 40  # features whose units are asked for one by one
 _MOST_KINDS = 12
 
@@ -66,12 +75,15 @@ class ColumnForm:
     previews: Sequence[ColumnPreview]
 
     @classmethod
-    def of_files(cls, key: str, files: Sequence[TableFile]) -> ColumnForm:
+    def of_files(
+        cls, key: str, files: Sequence[TableFile], said: Roles | None = None
+    ) -> ColumnForm:
         """The form for files that were uploaded, filled in with what their columns seem to be.
 
         Args:
             key: What the keys of its widgets begin with.
             files: One or more, or none.
+            said: What was said of their columns before.
 
         Returns:
             The form.
@@ -86,7 +98,7 @@ class ColumnForm:
                 contents: list[tuple[Content, str]] = [
                     (file.getbuffer(), file.name) for file in files
                 ]
-                previews = preview_columns(contents)
+                previews = preview_columns(contents, columns=said)
             except Exception:  # whoever reads the files says why
                 previews = ()
         form = cls(key, previews)
@@ -117,25 +129,32 @@ class ColumnForm:
         read: Callable[[], None],
         problem: Callable[[], None] | None,
         label: str = "Map the columns myself",
+        unmatched: UnmatchedNames | None = None,
     ) -> None:
-        """Offer the form, and draw it where it is open.
+        """Offer the form, and draw it where it is open; without it what rules need to know.
 
         Args:
             read: Reads the files with what is chosen then.
             problem: Says what was wrong with the choice, beside the button; None for nothing.
             label: Of what opens it.
+            unmatched: Names of rules for which a column has to be chosen.
         """
         if not self.previews:
             return
-        was_drawn = bool(self._get("drawn"))
-        self._set("drawn", st.toggle(label, key=f"{self.key}_columns"))
-        if not self._get("drawn"):
+        unmatched = unmatched or UnmatchedNames()
+        self._want(unmatched)
+        opened = st.toggle(label, key=f"{self.key}_columns")
+        names = bool(self._get("names")) if opened else any(unmatched[:2])
+        self._recall("drawn", self._fields(), drawn=opened)
+        self._recall("names_drawn", self._named(), drawn=names)
+        if not opened and not names:
             return
-        if not was_drawn:  # Streamlit forgets what was chosen in what it does not draw
-            for field, value in st.session_state[f"_{self.key}_chosen"].items():
-                self._set(field, value)
         with st.container(border=True):
-            self._draw(read, problem)
+            if opened:
+                self._draw(read, problem, unmatched.matched)
+            else:
+                self._ask_names(unmatched.matched)
+                self._buttons(read)
         self._remember()
 
     def roles(self) -> dict[str, ColumnRole]:
@@ -154,19 +173,28 @@ class ColumnForm:
                 f"there are no {'actions' if features else 'features'} in the form; choose at "
                 "least one column"
             )
+        called: dict[RoleName, dict[str, str]] = {"feature": {}, "action": {}}
+        for field, (role, name) in self._named().items():
+            if self._get(field) is not None:
+                called[role][self._get(field)] = name
         roles = {
-            name: ColumnRole("feature", unit=str(self._get(f"unit {name}") or "").strip())
-            for name in features
+            name: ColumnRole(
+                "feature",
+                unit=str(self._get(f"unit {name}") or "").strip(),
+                name=called["feature"].get(name, ""),
+            )
+            for name in dict.fromkeys([*features, *called["feature"]])
         }
         if self._together(actions):
             roles[TOGETHER.join(actions)] = ColumnRole("action")
         else:
-            roles |= {name: self._action(name) for name in actions}
+            named = called["action"]
+            roles |= {name: self._action(name, named.get(name, "")) for name in actions}
         for role in SINGLE_COLUMNS:
             column = self._get(role)
             if column is not None:
                 roles[column] = ColumnRole(role)
-        used = {*features, *actions, *roles}
+        used = {*actions, *roles}
         return roles | {
             one.name: ColumnRole("ignore") for one in self.previews if one.name not in used
         }
@@ -192,10 +220,42 @@ class ColumnForm:
             kind = one.role.kind if one.role is not None else None
             self._set(f"kind {one.name}", kind or one.kind_as_action)
             self._set(f"unit {one.name}", one.role.unit if one.role is not None else "")
-            self._set(f"low {one.name}", None)
-            self._set(f"high {one.name}", None)
+            self._set(f"low {one.name}", one.role.low if one.role is not None else None)
+            self._set(f"high {one.name}", one.role.high if one.role is not None else None)
+        names = {
+            (one.role.role, one.role.name): one.name
+            for one in self.previews
+            if one.role is not None and one.role.name
+        }
+        self._set("names", tuple(names))
+        for field, name in self._named().items():
+            self._set(field, names[name])
         self._remember()
         self._set("drawn", False)
+        self._set("names_drawn", False)
+
+    def _named(self) -> dict[str, tuple[RoleName, str]]:
+        """The fields for the columns of names, with what is called so."""
+        return {f"{role} called {name}": (role, name) for role, name in self._get("names")}
+
+    def _want(self, unmatched: UnmatchedNames) -> None:
+        """Have a field for each name that lacks a column, beside those that were chosen."""
+        chosen = st.session_state[f"_{self.key}_chosen"]
+        lacking: list[tuple[RoleName, str]] = [("feature", name) for name in unmatched.features]
+        lacking += [("action", name) for name in unmatched.actions]
+        before = [
+            name
+            for field, name in self._named().items()
+            if chosen.get(field) is not None or name in lacking
+        ]
+        self._set("names", tuple(dict.fromkeys([*before, *lacking])))
+
+    def _recall(self, part: str, fields: Iterable[str], *, drawn: bool) -> None:
+        """Set again what was chosen, which Streamlit forgets of what it does not draw."""
+        if not (drawn and self._get(part)):
+            for field in fields:
+                self._set(field, st.session_state[f"_{self.key}_chosen"].get(field))
+        self._set(part, drawn)
 
     def _fields(self) -> Iterator[str]:
         yield from ("observations", "actions", "together", *SINGLE_COLUMNS)
@@ -204,17 +264,17 @@ class ColumnForm:
 
     def _remember(self) -> None:
         st.session_state[f"_{self.key}_chosen"] = {
-            field: self._get(field) for field in self._fields()
+            field: self._get(field) for field in (*self._fields(), *self._named())
         }
 
-    def _action(self, name: str) -> ColumnRole:
+    def _action(self, name: str, called: str) -> ColumnRole:
         """The role of one action, with its bounds if it is an amount."""
         kind = self._get(f"kind {name}")
         if kind != "continuous":
-            return ColumnRole("action", kind=kind)
+            return ColumnRole("action", kind=kind, name=called)
         low, high = self._get(f"low {name}"), self._get(f"high {name}")
         try:
-            return ColumnRole("action", kind=kind, low=low, high=high)
+            return ColumnRole("action", kind=kind, low=low, high=high, name=called)
         except InputError as error:
             raise InputError(f"of the column {quoted(name)}: {error}") from error
 
@@ -227,19 +287,31 @@ class ColumnForm:
         """Let what was chosen in one field leave the others: a column is one thing."""
         chosen = self._get(field)
         claimed = set(chosen if isinstance(chosen, list) else [chosen])
+        named = self._named()
+        kind = _PLURAL[named[field][0]] if field in named else field
+        for other, (role, _) in named.items():
+            apart = field in named or kind != _PLURAL[role]
+            if other != field and apart and self._get(other) in claimed:
+                self._set(other, None)
         for other in ("observations", "actions"):
-            if other != field:
+            if other != kind:
                 self._set(other, [name for name in self._get(other) if name not in claimed])
         for role in SINGLE_COLUMNS:
             if role != field and self._get(role) in claimed:
                 self._set(role, None)
 
-    def _draw(self, read: Callable[[], None], problem: Callable[[], None] | None) -> None:
+    def _draw(
+        self,
+        read: Callable[[], None],
+        problem: Callable[[], None] | None,
+        matched: Sequence[str],
+    ) -> None:
         st.markdown("**Which column is what?**")
         st.html(column_previews_html(self.previews))
         self._ask_several("observations", "Features: what was seen, in their order")
         self._ask_several("actions", "Actions: what was done")
         self._ask_kinds()
+        self._ask_names(matched)
         with st.grid("auto", min_column_width=190):
             for role in _SINGLE:
                 self._ask_single(role)
@@ -254,6 +326,9 @@ class ColumnForm:
         st.caption("A column that is chosen nowhere is not used.")
         if problem is not None:
             problem()
+        self._buttons(read)
+
+    def _buttons(self, read: Callable[[], None]) -> None:
         with st.container(horizontal=True):
             st.button(
                 "Read with these columns",
@@ -332,6 +407,32 @@ class ColumnForm:
                             format="%g",
                             width=220,
                         )
+
+    def _ask_names(self, matched: Sequence[str]) -> None:
+        """Ask which column each name of the rules is of that no column bears."""
+        if not self._named():
+            return
+        st.markdown("**Names in the rules: which column is each?**")
+        actions = self._get("actions")
+        others = {*actions, *(self._get(role) for role in SINGLE_COLUMNS)}
+        free = [
+            one.name
+            for one in self.previews
+            if one.name not in others
+            and not {*plain_names(feature_names([one.name]) or ())} & {*plain_names(matched)}
+        ]
+        with st.grid("auto", min_column_width=190):
+            for field, (role, name) in self._named().items():
+                st.selectbox(
+                    escaped(name),
+                    free if role == "feature" else actions,
+                    key=f"{self.key}_{field}",
+                    format_func=_name,
+                    placeholder="Choose a column",
+                    index=None,
+                    on_change=self._claim,
+                    args=(field,),
+                )
 
     def _ask_units(self) -> None:
         features = self._get("observations")

@@ -99,18 +99,41 @@ def table(folder: Path) -> tuple[str, bytes, str]:
 def test_what_was_said_of_the_columns_is_kept_with_the_log(tmp_path: Path) -> None:
     app = open_page("audit", data="cartpole", support="0.01", confidence="0.9")
     app.file_uploader(key="log_file").set_value(table(tmp_path)).run()
-    first = [item.id for item in logs()]
     app.toggle(key="log_map_columns").set_value(True).run()
     app.multiselect(key="log_map_observations").set_value(list("abcd")).run()
     app.multiselect(key="log_map_actions").set_value(["what"]).run()
     app.selectbox(key="log_map_episode").set_value("run").run()
     app.button(key="log_map_read").click().run()
-    (mapped,) = (item for item in logs() if item.id not in first)
-    assert mapped.details["columns"]["run"] == "episode"
-    assert address(app)["log"] == mapped.id
+    assert "the log has no cart position, cart velocity, pole angle" in errors(app)[0]
+    assert "say which column is which in the form for the columns" in errors(app)[0]
+    app.toggle(key="log_map_columns").set_value(False).run()
+    features = load_demonstrations(DATA / "cartpole.parquet").feature_names
+    field = {name: f"log_map_feature called {name}" for name in features}
+    for name, column in zip(features, "aacd", strict=True):
+        app.selectbox(key=field[name]).set_value(column).run()
+    assert app.selectbox(key=field[features[0]]).value is None  # a column is one feature
+    assert app.selectbox(key=field[features[0]]).options == list("abcd")
+    app.selectbox(key=field[features[0]]).set_value("a").run()
+    app.selectbox(key=field[features[1]]).set_value("b").run()
+    app.button(key="log_map_read").click().run()
+    assert not errors(app)
+    assert metrics(app)["Steps"]
+    (mapped,) = (item for item in logs() if item.id == address(app)["log"])
+    assert mapped.details["columns"] == {
+        "a": "feature as cart position",
+        "b": "feature as cart velocity",
+        "c": "feature as pole angle",
+        "d": "feature as pole angular velocity",
+        "run": "episode",
+        "what": "action:labels",
+    }
     again = open_page("audit", **address(app))
-    assert texts(again).count("lab.csv")
-    assert errors(again) == errors(app)
+    assert not errors(again)
+    assert metrics(again) == metrics(app)
+    again.toggle(key="log_map_columns").set_value(True).run()
+    assert again.selectbox(key=field[features[0]]).value == "a"
+    again.button(key="log_map_read").click().run()
+    assert metrics(again) == metrics(app)
 
 
 def test_another_log_with_the_columns_of_the_first_is_kept_as_they_were_read(

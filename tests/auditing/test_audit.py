@@ -20,6 +20,7 @@ from sarl_core import (
 )
 from sarl_core.auditing.comparison import LogComparison
 from sarl_core.auditing.guards import guard
+from sarl_core.auditing.matching import unmatched_names
 from sarl_core.auditing.near import NEAR, spreads_of
 from sarl_core.shielding.neighbourhood import Neighbourhood
 
@@ -126,7 +127,7 @@ def test_features_and_labels_are_matched_by_name(
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"feature_names": ("gust", *NAMES[1:])}, "number 1 is 'gust' in the log"),
+        ({"feature_names": ("gust", *NAMES[1:])}, "has no wind (the log: gust, load"),
         ({"feature_units": ("km/h",) + ("",) * 7}, "gives 'wind' in km/h and the rules ask"),
         (
             {"label_names": (("brake", "lift", "lower", "swing"),)},
@@ -337,3 +338,26 @@ def test_breaks_are_counted_by_the_minute_where_times_are_known(
     assert guard("breaks_per_minute>1000").holds(untimed)  # it cannot be known
     still = audit(rules, replace(log, times=np.zeros(40)))
     assert still.clock is None
+
+
+def test_what_a_log_lacks_is_named_and_may_be_what_its_columns_are_called(
+    rules: RuleSet, demonstrations: Demonstrations
+) -> None:
+    features = replace(demonstrations, feature_names=("gust", *NAMES[1:]))
+    assert unmatched_names(rules, features)[:2] == (("wind",), ())
+    assert unmatched_names(rules, features).matched == NAMES[1:]
+    assert unmatched_names(rules, demonstrations) == ((), (), NAMES)
+    counted = replace(demonstrations, feature_names=None)
+    assert unmatched_names(rules, counted)[:2] == ((), ())
+
+
+def test_dimensions_of_other_names_are_named(lander_like: Demonstrations) -> None:
+    seen = lander_like.observations
+    amounts = Demonstrations(
+        seen, seen[:, :2] / 2, lander_like.episodes, action_names=("gas", "steer")
+    )
+    rules = mine_rules(amounts, supp_min=0.01, conf_min=0.6)
+    log = replace(amounts, action_names=("push", "steer"))
+    assert unmatched_names(rules, log).actions == ("gas",)
+    with pytest.raises(InputError, match=r"has no gas .*COLUMN=action as gas"):
+        audit(rules, log)

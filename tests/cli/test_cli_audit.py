@@ -4,8 +4,10 @@ import csv
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
+from sarl_core import load_demonstrations
 from sarl_core.cli.app import main
 
 RULES = "data/rules/cartpole_compact.json"
@@ -150,3 +152,20 @@ def test_steps_that_lack_a_value_are_counted_and_do_not_end_a_job(
     assert (document["steps"], document["gaps"], document["missing_steps"]) == (2, 1, 2)
     assert "2 of 4 steps lack a value and were left out" in document["notes"][0]
     assert main(["audit", RULES, str(log), "--json", "--missing", "refuse"]) == 2
+
+
+def test_a_column_of_another_name_is_a_feature_of_the_rules(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = load_demonstrations(LOG).select(range(2))
+    columns = dict(zip(["px", *log.feature_names[1:]], log.observations.T, strict=True))
+    frame = pd.DataFrame({"episode": log.episodes, **columns, "action": log.actions})
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    command = ["audit", RULES, str(tmp_path / "log.csv"), "--json"]
+    assert main(command) == 2
+    assert "with --column 'COLUMN=feature as cart position'" in capsys.readouterr().err
+    command += ["--column", "px=feature as cart position"]
+    assert main(command) == 0
+    assert json.loads(capsys.readouterr().out)["steps"] == len(log)
+    # What was said is of the log: what the rules were mined from has columns of its own.
+    assert main([*command, "--demonstrations", LOG]) == 0

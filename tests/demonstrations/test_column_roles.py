@@ -114,6 +114,11 @@ def test_every_column_but_one_can_be_left_out():
         ({"x": "action:continuous:0:inf"}, "the lower one first"),
         ({"x": "action:labels:0:1"}, "only a continuous action has bounds"),
         ({"x": "episode:m"}, "is no role"),
+        ({"x": "episode as run"}, "that is 'episode' has no other name"),
+        ({"x": "feature as "}, "'feature as' is no role"),
+        ({"x": "feature as z", "y": "feature as z"}, "both said to be the feature 'z'; choose one"),
+        ({"x": "feature as y"}, "there is a column of that name; say what that one is"),
+        ({"x": "feature as y", "y": "feature"}, "the feature name 'y' stands twice"),
     ],
 )
 def test_what_cannot_be_said_is_refused_in_a_sentence(columns: dict[str, str], fragment: str):
@@ -122,8 +127,32 @@ def test_what_cannot_be_said_is_refused_in_a_sentence(columns: dict[str, str], f
 
 
 def test_a_role_reads_as_it_is_written():
-    for text in ("episode", "feature:km/h", "action:labels", "action:continuous:-0.5:1e-09"):
+    for text in (
+        "episode",
+        "feature:km/h",
+        "feature:km/h as own speed",
+        "feature as time: to go",
+        "action:labels",
+        "action:continuous:-0.5:1e-09",
+        "action as pedal",
+    ):
         assert str(role_from_text(text)) == text
+
+
+def test_features_and_actions_are_called_as_was_said(tmp_path: Path):
+    content = table(obs_v=SPEED, obs_a=GAP, gas=LANE, brake=BRAKE, episode=EPISODE)
+    said = {
+        "obs_v": "feature:m/s as own speed",
+        "brake": "action:labels as pedal",
+        "gas": "action:labels",
+    }
+    read = read_demonstrations(content, "rig.csv", columns=said)
+    assert read.feature_names == ("own speed", "a")
+    assert read.feature_units == ("m/s", "")
+    assert {one.name for one in read.action_dimensions} == {"gas", "pedal"}
+    roles = {name: role_from_text(role) for name, role in said.items()}
+    save_roles(tmp_path / "columns.json", roles, {})
+    assert load_roles(tmp_path / "columns.json") == roles
 
 
 def test_the_action_of_somebody_is_the_action():

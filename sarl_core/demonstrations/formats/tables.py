@@ -30,7 +30,7 @@ from sarl_core.demonstrations.formats.mapping.action_roles import (
     with_stated_actions,
 )
 from sarl_core.demonstrations.formats.mapping.joined import joined, one_action_note
-from sarl_core.demonstrations.formats.mapping.roles import Roles
+from sarl_core.demonstrations.formats.mapping.roles import Roles, names_in
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
 from sarl_core.demonstrations.formats.recording import Recording
@@ -74,6 +74,7 @@ def recording_from_table(
         table = joined(table, columns)
         guess, guessed = guess_roles(table.names, columns), True
         metadata = _without_names(metadata)
+        names = {**(names or {}), **names_in(columns)}
     elif metadata.features and metadata.action_names:
         guess = given(_own_columns(table.names, metadata), "the file itself says so")
     elif not table.named:

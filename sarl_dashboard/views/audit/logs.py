@@ -11,6 +11,7 @@ from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.auditing.audit import Audit, audit
 from sarl_core.auditing.comparison import LogComparison
+from sarl_core.auditing.matching import UnmatchedNames, unmatched_names
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import ColumnRole
 from sarl_core.errors import InputError, SarlError
@@ -166,7 +167,7 @@ class _Log:
 
     @property
     def form(self) -> ColumnForm:
-        return ColumnForm.of_files(f"{self.key}_map", [self.file])
+        return ColumnForm.of_files(f"{self.key}_map", [self.file], dict(self.roles))
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -261,18 +262,29 @@ def _answer(rules: ChosenRules, log: _Log, roles: _Roles) -> Audit | None:
             held = _audited(rules, log.file, roles)
         except SarlError as error:
             problem = str(error)
+    unmatched = None if problem is None else _unmatched(rules, log)
     if state.get(f"_{log.key}_seen") != log.file.file_id:  # closed by the visitor, it stays closed
         state[f"_{log.key}_seen"] = log.file.file_id
         state[f"{form.key}_columns"] = False
-        if problem is not None:
+        if problem is not None and unmatched is None:
             form.open_for(problem)
     in_form = form.is_open and bool(state.get(f"_{log.key}_mapped"))
     say = None if problem is None else partial(refuse, problem)
     if say is not None and not in_form:
         say()
     label = f"Map the columns of {escaped(log.file.name)} myself"
-    form.draw(log.read, say if in_form else None, label)
+    form.draw(log.read, say if in_form else None, label, unmatched)
     return held
+
+
+def _unmatched(rules: ChosenRules, log: _Log) -> UnmatchedNames | None:
+    """Names of the rules that a log lacks; None where it lacks none, or cannot be read."""
+    try:
+        read = _read(log.file.getvalue(), log.file.name, log.roles)
+    except SarlError:
+        return None
+    unmatched = unmatched_names(rules.rule_set, read)
+    return unmatched if any(unmatched[:2]) else None
 
 
 def _audited(rules: ChosenRules, file: UploadedFile | _LibraryFile, roles: _Roles) -> Audit:

@@ -55,11 +55,14 @@ UNCLEAR = "unclear"
 """What stands in a suggestion where two readings are possible."""
 TOGETHER = "+"
 """Between columns that are one action together."""
+_CALLED = " as "
+"""Between what a column is and what it is to be called."""
 _GRAMMAR = (
     "write NAME=ROLE with one of the roles "
     f"{', '.join(get_args(RoleName))}; a feature may have a unit (speed=feature:m/s), and a time "
     "(t=time:ms), and an action may be labels or continuous with or without bounds "
-    "(throttle=action:continuous:0:100)"
+    "(throttle=action:continuous:0:100); what rules call it may stand behind it (v=feature as own "
+    "speed)"
 )
 _MOST_OFFERED = 3  # columns of which a sentence says what to do
 _FORMAT, _VERSION = "sarl-columns", 1
@@ -75,6 +78,7 @@ class ColumnRole:
         kind: Whether an action is labels or an amount; None to go by its values.
         low: Lower bound of a continuous action; None to go by its values.
         high: Upper bound, likewise.
+        name: Of the feature or the action; "" for the column's own.
 
     Raises:
         InputError: If that does not go together.
@@ -85,8 +89,14 @@ class ColumnRole:
     kind: ActionKind | None = None
     low: float | None = None
     high: float | None = None
+    name: str = ""
 
     def __post_init__(self) -> None:
+        if self.name and self.role not in ("feature", "action"):
+            raise InputError(
+                f"a column that is {self.role!r} has no other name here; only a feature and an "
+                "action do, so leave the name out"
+            )
         if self.unit and self.role not in ("feature", "time"):
             raise InputError(f"a column that is {self.role!r} has no unit here; leave the unit out")
         if self.unit and self.role == "time" and self.unit not in SECONDS:
@@ -113,7 +123,8 @@ class ColumnRole:
     def __str__(self) -> str:
         """As it is written after ``--column NAME=``."""
         bounds = [decimal_text(one) for one in (self.low, self.high) if one is not None]
-        return ":".join([self.role, *filter(None, (self.unit, self.kind)), *bounds])
+        text = ":".join([self.role, *filter(None, (self.unit, self.kind)), *bounds])
+        return f"{text}{_CALLED}{self.name}" if self.name else text
 
 
 Roles = Mapping[str, ColumnRole]
@@ -123,7 +134,8 @@ def role_from_text(text: str) -> ColumnRole:
     """Read what ``--column NAME=`` is followed by.
 
     Args:
-        text: As "episode", "feature:m/s", "action:labels", "action:continuous:0:100".
+        text: As "episode", "feature:m/s", "action:labels", "action:continuous:0:100",
+            "feature:m/s as own speed".
 
     Returns:
         The role.
@@ -131,12 +143,14 @@ def role_from_text(text: str) -> ColumnRole:
     Raises:
         InputError: If it is none.
     """
-    role, *more = text.strip().split(":")
+    said, _, name = text.strip().partition(_CALLED)
+    name = name.strip()
+    role, *more = said.split(":")
     role = role.strip().lower()
     if role not in ROLE_WORDS:
         raise InputError(f"{quoted(role)} is no role of a column; {_GRAMMAR}")
     if role in ("feature", "time"):
-        return ColumnRole(cast("RoleName", role), unit=":".join(more).strip())
+        return ColumnRole(cast("RoleName", role), unit=":".join(more).strip(), name=name)
     fits = not more or (role == "action" and len(more) in (1, 3))
     kind = more[0].strip().lower() if more else None
     if not fits or kind not in (None, *get_args(ActionKind)):
@@ -145,7 +159,8 @@ def role_from_text(text: str) -> ColumnRole:
         bounds = [float(bound) for bound in more[1:]]
     except ValueError:
         raise InputError(f"{quoted(text)} has bounds that are no numbers; {_GRAMMAR}") from None
-    return ColumnRole(cast("RoleName", role), "", cast("ActionKind | None", kind), *bounds)
+    low, high = bounds or (None, None)
+    return ColumnRole(cast("RoleName", role), "", cast("ActionKind | None", kind), low, high, name)
 
 
 def roles_from_options(options: Iterable[str]) -> dict[str, ColumnRole]:
@@ -169,6 +184,11 @@ def roles_from_options(options: Iterable[str]) -> dict[str, ColumnRole]:
             raise InputError(f"--column says twice what {quoted(name)} is; say it once")
         roles[name] = role_from_text(text)
     return roles
+
+
+def names_in(roles: Roles) -> dict[str, str]:
+    """What features and actions are to be called, by their columns; only those that were named."""
+    return {column: role.name for column, role in roles.items() if role.name}
 
 
 def as_options(roles: Roles) -> list[str]:
@@ -200,6 +220,7 @@ class _Role(Struct, forbid_unknown_fields=True):
     kind: ActionKind | None = None
     low: Number | None = None
     high: Number | None = None
+    name: str = ""
     why: str = ""
 
 
@@ -237,7 +258,12 @@ def load_roles(path: Path) -> dict[str, ColumnRole]:
                         f"{', '.join(get_args(RoleName))}"
                     )
                 roles[name] = ColumnRole(
-                    cast("RoleName", said.role), said.unit, said.kind, said.low, said.high
+                    cast("RoleName", said.role),
+                    said.unit,
+                    said.kind,
+                    said.low,
+                    said.high,
+                    said.name.strip(),
                 )
             except MisfitError as error:
                 raise MisfitError(f"of the column {quoted(name)} {error}") from error
@@ -283,7 +309,7 @@ def roles_document(roles: Mapping[str, ColumnRole | None], reasons: Mapping[str,
 
 
 def require_known(roles: Roles, names: Sequence[str]) -> None:
-    """Refuse what is said of a column that a table does not have, or twice of one role.
+    """Refuse what is said of a column that a table does not have, or twice of one role or name.
 
     Args:
         roles: What was said.
@@ -297,7 +323,21 @@ def require_known(roles: Roles, names: Sequence[str]) -> None:
         listed = ", ".join(map(quoted, names[:12])) + (", …" if len(names) > 12 else "")
         raise InputError(f"there is no column {quoted(missing)} among {listed}; name one of those")
     single: dict[str, str] = {}
+    named: dict[tuple[str, str], str] = {}
     for name, one in roles.items():
+        if one.name:
+            if (one.role, one.name) in named:
+                raise InputError(
+                    f"{quoted(named[one.role, one.name])} and {quoted(name)} are both said to be "
+                    f"the {one.role} {quoted(one.name)}; choose one"
+                )
+            named[one.role, one.name] = name
+            if one.name in names and one.name not in roles:
+                raise InputError(
+                    f"{quoted(name)} is said to be the {one.role} {quoted(one.name)}, and there is "
+                    f"a column of that name; say what that one is, as with --column "
+                    f"{shlex.quote(f'{one.name}=ignore')}"
+                )
         if one.role in ("feature", "action", "time", "ignore"):
             continue
         if one.role in single:
