@@ -7,6 +7,7 @@ import time
 from html import unescape
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qsl
 
 from streamlit.testing.v1 import AppTest
 
@@ -25,6 +26,16 @@ def open_page(name: str, **query: str | list[str]) -> AppTest:
         app.switch_page(page_file(name)).run()
     assert not app.exception, app.exception
     return app
+
+
+def follow(app: AppTest, label: str) -> None:
+    """Click a link to a page."""
+    link = next(one.proto for one in app.get("page_link") if one.proto.label == label)
+    for name in list(app.query_params):
+        del app.query_params[name]
+    for name, value in parse_qsl(link.query_string):
+        app.query_params[name] = value
+    app.switch_page(page_file(link.page)).run()
 
 
 def page_file(name: str) -> str:

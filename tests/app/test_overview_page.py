@@ -12,7 +12,7 @@ from sarl_core import load_rules, make_agent, rollout
 from sarl_core.explaining.words.glossary import GLOSSARY, meaning_of
 from sarl_core.shielding.shield import Shield
 from sarl_dashboard.components.journey.first_run import STEPS
-from tests.app.screens import ROUTER, open_page, run_through, texts
+from tests.app.screens import ROUTER, follow, open_page, run_through, texts
 
 DATA = ROUTER.parents[1] / "data"
 REPLAY = DATA / "replays" / "lunar_lander.gif"
@@ -117,7 +117,7 @@ def test_the_words_open_beside_any_page() -> None:
 def test_the_first_run_leads_through_five_pages_on_lunar_lander() -> None:
     app = open_page("overview", data="cartpole", set="compact")
     assert len(STEPS) == 5
-    app.button(key="first_run_begin").click().run()
+    follow(app, "Begin the first run")
     for number, step in enumerate(STEPS):
         assert not app.exception
         assert app.title[0].value == step.page
@@ -130,7 +130,9 @@ def test_the_first_run_leads_through_five_pages_on_lunar_lander() -> None:
             assert app.selectbox(key="_rules_choice").value == "fewest, two features"
         if step.page == "Replay":
             assert app.selectbox(key="rules").value == "fewest, two features"
-        app.button(key="first_run_on").click().run()
+            app.button(key="first_run_on").click().run()
+        else:
+            follow(app, f"Next: {STEPS[number + 1].page}")
     assert app.title[0].value == "Overview"
     app.switch_page("rules.py").run()
     assert "First run" not in texts(app)
@@ -138,17 +140,15 @@ def test_the_first_run_leads_through_five_pages_on_lunar_lander() -> None:
 
 def test_the_first_run_waits_while_one_looks_elsewhere_and_ends_when_told_to() -> None:
     app = open_page("overview")
-    app.button(key="first_run_begin").click().run()
-    app.button(key="first_run_on").click().run()
+    follow(app, "Begin the first run")
+    follow(app, "Next: Thresholds")
     app.switch_page("export.py").run()
     assert "step 2 of 5" in texts(app)
     assert STEPS[1].task not in texts(app)
-    app.button(key="first_run_on").click().run()
+    follow(app, "Go on with Thresholds")
     assert app.title[0].value == "Thresholds"
-    app.switch_page("thresholds.py").run()  # AppTest does not know that it was sent there
-    app.button(key="first_run_back").click().run()
+    follow(app, "Back")
     assert app.title[0].value == "Demonstrations"
-    app.switch_page("demonstrations.py").run()
     app.button(key="first_run_end").click().run()
     assert app.title[0].value == "Demonstrations"
     assert "First run" not in texts(app)

@@ -6,14 +6,9 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.walking import no_trace, parameters, settle, visit
+from tests.browser.walking import addresses, no_trace, parameters, settle, visit
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
-
-
-def addresses(screen: Page) -> int:
-    """How many the browser goes through."""
-    return int(screen.evaluate("history.length"))
 
 
 def go(screen: Page, page: str) -> None:

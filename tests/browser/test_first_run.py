@@ -5,7 +5,7 @@ from __future__ import annotations
 from playwright.sync_api import Page, expect
 
 from sarl_dashboard.components.journey.first_run import STEPS
-from tests.browser.walking import no_trace, parameters, settle, visit
+from tests.browser.walking import addresses, no_trace, parameters, settle, visit
 
 
 def test_the_first_run_goes_from_the_overview_to_a_replay_and_back(screen: Page) -> None:
@@ -15,16 +15,18 @@ def test_the_first_run_goes_from_the_overview_to_a_replay_and_back(screen: Page)
     film = screen.request.get(source).body()
     assert film.startswith(b"GIF89a")  # as it was made: a picture that is made smaller stands still
     assert b"NETSCAPE2.0" in film
-    screen.get_by_role("button", name="Begin the first run").click()
-    for step in STEPS:
+    before = addresses(screen)
+    screen.get_by_role("link", name="Begin the first run").click()
+    for number, step in enumerate(STEPS):
         expect(screen.get_by_role("heading", name=step.page, level=1, exact=True)).to_be_visible()
         settle(screen)
         expect(screen.locator(".st-key-first_run")).to_contain_text(step.what)
         for name, value in step.query.items():
             if (name, value) not in (("data", "lunar_lander"), ("set", "thresholds")):
                 assert parameters(screen).get(name, "novice") == value
+        assert addresses(screen) == before + number + 1  # Back leads from step to step
         no_trace(screen)
-        screen.locator(".st-key-first_run_on button").click()
+        screen.locator(".st-key-first_run_on").locator("a, button").click()
     expect(screen.get_by_role("heading", name="Overview", level=1)).to_be_visible()
     settle(screen)
     expect(screen.locator(".st-key-first_run")).to_have_count(0)

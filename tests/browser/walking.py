@@ -53,6 +53,11 @@ def parameters(screen: Page) -> dict[str, str]:
     return {name: values[0] for name, values in parse_qs(urlsplit(screen.url).query).items()}
 
 
+def addresses(screen: Page) -> int:
+    """How many the browser goes through."""
+    return int(screen.evaluate("history.length"))
+
+
 def rules_choice(screen: Page) -> Locator:
     """Which rules are in force, in the sidebar."""
     return screen.get_by_test_id("stSidebar").get_by_role("combobox", name="Rules")

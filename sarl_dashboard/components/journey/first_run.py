@@ -15,6 +15,8 @@ _STEP, _DONE = "first_run", "_first_run_done"
 _TASK = {"data": DEFAULT_DATA}
 _SLIDERS = {**_TASK, "set": THRESHOLDS}
 _SIX_RULES = {**_TASK, "set": FEWEST}
+_USUAL = _SLIDERS
+_ON = ":material/east:"
 
 
 @dataclass(frozen=True)
@@ -78,14 +80,9 @@ STEPS = (
         "Press **Run**. On the left the six rules correct an agent that acts at random; on the "
         "right nobody does. They were learned from examples and guarantee nothing: try other "
         "seeds, and on the page Measure many episodes at once.",
-        {**_SIX_RULES, "agent": "novice", "rules": FEWEST},
+        {**_SIX_RULES, "rules": FEWEST},
     ),
 )
-
-
-def begin_first_run() -> None:
-    """Go to the first step, on Lunar Lander; what was uploaded stays and can be chosen again."""
-    _go(0)
 
 
 def take_up() -> None:
@@ -107,9 +104,29 @@ def first_run_done() -> bool:
     return bool(st.session_state.get(_DONE))
 
 
-def _go(number: int) -> None:
+def link_to_step(number: int, label: str, icon: str, *, key: str) -> None:
+    """A link to a step: the browser goes there in one step, and back in one.
+
+    An address that says what goes without saying is written anew and is one more to go back to, so
+    the link says what is chosen there but for what is chosen anyway.
+
+    Args:
+        number: Of the step, from 0.
+        label: What stands on it.
+        icon: Before that.
+        key: Of its place; where it ends in "_on" it looks like the button to press next.
+    """
     step = STEPS[number]
-    st.switch_page(step.file, query_params={**step.query, _STEP: str(number + 1)})
+    now = {name: st.session_state.get(f"_{name}", usual) for name, usual in _USUAL.items()}
+    said = {
+        name: value
+        for name, value in step.query.items()
+        if not value == _USUAL.get(name) == now.get(name)
+    }
+    with st.container(key=key, width="content"):
+        st.page_link(
+            step.file, label=label, icon=icon, query_params={**said, _STEP: str(number + 1)}
+        )
 
 
 def _end() -> None:
@@ -130,22 +147,17 @@ def show_first_run(page: str) -> None:
     with st.container(border=True, key="first_run"):
         here = f"**First run, step {number + 1} of {len(STEPS)}: {step.what}.**"
         st.markdown(f"{here} {step.task}" if page == step.page else here)
-        with st.container(horizontal=True, gap="small"):
+        with st.container(horizontal=True, vertical_alignment="center", gap="small"):
             if page != step.page:
-                if st.button(f"Go on with {step.page}", key="first_run_on", type="primary"):
-                    _go(number)
+                link_to_step(number, f"Go on with {step.page}", _ON, key="first_run_on")
             elif last:
                 if st.button("Done", key="first_run_on", type="primary", icon=":material/check:"):
                     st.session_state[_DONE] = True
                     _end()
                     st.switch_page("overview.py", query_params=_TASK)
-            elif st.button(
-                f"Next: {STEPS[number + 1].page}",
-                key="first_run_on",
-                type="primary",
-                icon=":material/east:",
-            ):
-                _go(number + 1)
-            if page == step.page and number and st.button("Back", key="first_run_back"):
-                _go(number - 1)
+            else:
+                after = STEPS[number + 1].page
+                link_to_step(number + 1, f"Next: {after}", _ON, key="first_run_on")
+            if page == step.page and number:
+                link_to_step(number - 1, "Back", ":material/west:", key="first_run_back")
             st.button("End the first run", key="first_run_end", type="tertiary", on_click=_end)

@@ -6,8 +6,8 @@ import streamlit as st
 
 from sarl_dashboard.components.journey.first_run import (
     STEPS,
-    begin_first_run,
     first_run_done,
+    link_to_step,
     step_at_hand,
 )
 from sarl_dashboard.state.data import UPLOAD
@@ -23,22 +23,14 @@ def show_doors() -> None:
             "a few minutes, and no file."
         )
         waits = step_at_hand()
-        label = "Begin the first run" if waits is None else "Begin it anew"
         with st.container(horizontal=True, gap="small"):
-            if waits is not None:
-                st.page_link(
-                    STEPS[waits].file,
-                    label=f"Go on with step {waits + 1}: {STEPS[waits].page}",
-                    icon=":material/play_arrow:",
-                    query_params=STEPS[waits].query,
-                )
-            if st.button(
-                label,
-                key="first_run_begin",
-                icon=":material/flag:",
-                type="primary" if waits is None and not first_run_done() else "secondary",
-            ):
-                begin_first_run()
+            if waits is None:
+                key = "first_run_again" if first_run_done() else "first_run_begin_on"
+                link_to_step(0, "Begin the first run", ":material/flag:", key=key)
+            else:
+                label = f"Go on with step {waits + 1}: {STEPS[waits].page}"
+                link_to_step(waits, label, ":material/play_arrow:", key="first_run_on")
+                link_to_step(0, "Begin it anew", ":material/flag:", key="first_run_again")
     with st.container(border=True):
         st.markdown("**Use my data**")
         st.caption(
