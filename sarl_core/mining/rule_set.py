@@ -29,7 +29,7 @@ from sarl_core.mining.language import (
 )
 from sarl_core.mining.rule_contents import RuleContents
 from sarl_core.mining.rule_files import file_parts, read_rules, write_rules
-from sarl_core.mining.rules import Rule, name_at
+from sarl_core.mining.rules import Rule, as_numbered, name_at
 from sarl_core.notebooks import MOST_ROWS, table_html
 
 if TYPE_CHECKING:
@@ -134,8 +134,8 @@ class RuleSet(RuleContents, Sequence[Rule]):
 
     @cached_property
     def names(self) -> Mapping[str, str]:
-        """What people call the rules, by id: R1 to Rn, by their place in the set."""
-        return {rule.id: name_at(place) for place, rule in enumerate(self.rules)}
+        """What people call the rules, by id: R1 to Rn (`as_numbered`)."""
+        return {rule.id: name_at(place) for place, rule in enumerate(as_numbered(self.rules))}
 
     def name_of(self, rule: Rule) -> str:
         """What people call a rule; its id is for files and links.

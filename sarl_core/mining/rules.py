@@ -231,6 +231,31 @@ def node_of(rule: Rule) -> int:
     return int(rule.id.rsplit(".", 1)[1])
 
 
+def as_numbered(rules: Sequence[Rule]) -> Sequence[Rule]:
+    """Rules in the order in which they are numbered.
+
+    A mined rule that is pinned goes to the front, and is still called what it was called among the
+    mined ones. Rules that a person wrote come after those, as they were written.
+
+    Args:
+        rules: In the order in which they are asked.
+
+    Returns:
+        The same as they stand, where none is placed, or the others' order does not say where one
+        was.
+    """
+    if not any(rule.placed for rule in rules):
+        return rules
+    try:
+        numbers = {
+            rule.id: (rule.origin != "mined", rule.dimension, node_of(rule)) for rule in rules
+        }
+    except (IndexError, ValueError):
+        return rules
+    left = [numbers[rule.id] for rule in rules if not rule.placed]
+    return sorted(rules, key=lambda rule: numbers[rule.id]) if left == sorted(left) else rules
+
+
 def name_at(place: int) -> str:
     """What people call a rule.
 

@@ -117,23 +117,25 @@ def test_a_rule_by_hand_is_previewed_added_moved_changed_and_removed() -> None:
     assert metrics(app)["Decided differently"] == "0"  # it is not there yet
     click(app, draft(app, "save"))
     assert metrics(app)["Decided differently"] == f"{differently(FILTERED, after):,}"
-    assert (table(app)["Rule"][0], table(app)["Kind"][0]) == ("R1", "manual")
+    own = f"R{len(FILTERED) + 1}"
+    assert (table(app)["Rule"][0], table(app)["Kind"][0]) == (own, "manual")
     overruled = app.dataframe[1].value
     assert overruled["States"].sum() == int(metrics(app)["Conflicts"].replace(",", ""))
-    assert set(overruled["Rule"]) == {"R1"}
+    assert set(overruled["Rule"]) == {own}
     # A second one, and the order.
     fill_in(app, "pole angle", "above", 0.0, 1)
     click(app, draft(app, "save"))
-    assert table(app)["Rule"].tolist()[:2] == ["R1", "R2"]
+    second = f"R{len(FILTERED) + 2}"
+    assert table(app)["Rule"].tolist()[:2] == [own, second]
     assert table(app)["Action"].tolist()[:2] == [["push left"], ["push right"]]
     click(app, "edit_up")
-    assert table(app)["Rule"].tolist()[:2] == ["R1", "R2"]
+    assert table(app)["Rule"].tolist()[:2] == [second, own]
     assert table(app)["Action"].tolist()[:2] == [["push right"], ["push left"]]
     assert table(app)["Decides"].tolist()[:2] == [int(states.sum()), 0]
     click(app, "change_rule")
     app.number_input(key=draft(app, "at_0")).set_value(0.05).run()
     click(app, draft(app, "save"))
-    assert any(label.startswith("Undo: change R1") for label in labels(app))
+    assert any(label.startswith(f"Undo: change {second}") for label in labels(app))
     assert table(app)["Decides"][0] == int((CARTPOLE.observations[:, 2] > 0.05).sum())
     click(app, "edit_remove")
     assert table(app)["Kind"].tolist()[:2] == ["manual", "mined"]

@@ -71,7 +71,7 @@ def test_a_search_on_edit_finds_rules_of_every_page(
 def test_a_search_looks_at_words_and_names(rules: RuleSet) -> None:
     texts = [f"{conditions_text(rule, rules)} {rules.name_of(rule)}".lower() for rule in rules]
     for word in ("angle", "≤", "r12", "0.1"):
-        have = rule_search.have_word(rules, word) | rule_search.names_have_word(len(rules), word)
+        have = rule_search.have_word(rules, word) | rule_search.names_have_word(rules, word)
         does = [word in rules.actions[0].label_names[rule.action] for rule in rules]
         assert have.tolist() == [
             word in text or says for text, says in zip(texts, does, strict=True)

@@ -95,12 +95,12 @@ def test_a_change_and_a_conflict_in_words():
         change(many, more), many, more, states="state"
     )
     assert conflict_text(after.conflicts[0], after.rule_set, states="state") == (
-        "R1 (right) takes 2 states from R2 (left); the expert did as R1 says in 0 of them, as R2 "
+        "R2 (right) takes 2 states from R1 (left); the expert did as R2 says in 0 of them, as R1 "
         "says in 2."
     )
     unknown = verdicts(ground, after.rule_set)
     assert conflict_text(unknown.conflicts[0], unknown.rule_set, states="state") == (
-        "R1 (right) takes 2 states from R2 (left)."
+        "R2 (right) takes 2 states from R1 (left)."
     )
 
 
@@ -148,13 +148,13 @@ def test_a_document_and_tables():
     assert document["dimensions"][0]["confusion"] == [[0, 2, 3], [0, 0, 0], [0, 5, 0]]
     rows = rule_rows(FOUND)
     assert rows["What"] == ["changed", "added"]
-    assert rows["Rule"] == ["R2", "R1"]
+    assert rows["Rule"] == ["R1", "R2"]
     assert rule_rows(FOUND, ("added",))["When"] == ["angle > 0.3 rad"]
     examples = example_rows(FOUND, 0, STATES, names=("a", "b"), demonstrations=SHOWN, most=4)
     assert examples["Step"] == [0, 3, 6, 9]
     assert examples["A says"] == ["left", "left", "no rule", "no rule"]
     assert examples["B says"] == ["no rule", "right", "right", "right"]
-    assert examples["Rule, b"] == ["–", "R1", "R1", "R1"]
+    assert examples["Rule, b"] == ["–", "R2", "R2", "R2"]
     assert examples["Expert did"] == ["left", "left", "right", "right"]
     assert "Expert did" not in example_rows(FOUND, 0, STATES, names=("a", "b"))
 

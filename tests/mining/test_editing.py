@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -371,3 +373,25 @@ def test_a_rule_that_is_there_already_is_refused_but_not_one_that_overrules_it()
     with pytest.raises(InputError, match="move it up"):
         manual(edited, ABOVE, rule_id="manual.2")
     assert manual(edited, ABOVE).id == "manual.1"  # itself, unchanged
+
+
+def test_a_rule_keeps_its_number_when_it_is_pinned_or_another_is_added():
+    own = manual(COARSE, ABOVE)
+    second = manual(COARSE, ABOVE, rule_id="manual.2")
+    last = COARSE.rules[-1]
+    edited = apply(COARSE, [Pin(last), Add(own), Add(second), Move("manual.2", up=True)])
+    assert [rule.id for rule in edited.rules[:3]] == [last.id, "manual.2", "manual.1"]
+    assert {rule.id: edited.name_of(rule) for rule in edited.rules if rule.origin == "mined"} == {
+        rule.id: COARSE.name_of(rule) for rule in COARSE.rules
+    }
+    assert edited.name_of(own) == f"R{len(COARSE) + 1}"
+    assert edited.name_of(second) == f"R{len(COARSE) + 2}"
+
+
+def test_rules_with_ids_of_somebody_else_are_numbered_as_they_stand():
+    rules = tuple(replace(rule, id=f"their {rule.id}.x") for rule in COARSE.rules)
+    first = replace(rules[1], pinned=True)
+    theirs = replace(COARSE, rules=(first, rules[0], *rules[2:]))
+    assert [theirs.name_of(rule) for rule in theirs.rules] == [
+        f"R{number + 1}" for number in range(len(rules))
+    ]

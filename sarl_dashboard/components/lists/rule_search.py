@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from sarl_core.mining.language import Wording
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.rules import name_at
 from sarl_dashboard.cache import cached
 
 if TYPE_CHECKING:
@@ -32,11 +31,11 @@ def searched_texts(rule_set: RuleSet) -> pa.Array:
 
 
 @cached()
-def _names(count: int) -> pa.Array:
-    """What so many rules are called, by their places, in small letters."""
+def _names(rule_set: RuleSet) -> pa.Array:
+    """What rules are called, in small letters."""
     import pyarrow as pa
 
-    return pa.array([name_at(place).lower() for place in range(count)])
+    return pa.array([rule_set.name_of(rule).lower() for rule in rule_set.rules])
 
 
 def have_word(rule_set: RuleSet, word: str) -> NDArray[np.bool_]:
@@ -51,8 +50,8 @@ def have_word(rule_set: RuleSet, word: str) -> NDArray[np.bool_]:
     return np.asarray(pc.match_substring(searched_texts(rule_set), word))
 
 
-def names_have_word(count: int, word: str) -> NDArray[np.bool_]:
-    """Whether the name of each of so many rules has a word in it, by their places."""
+def names_have_word(rule_set: RuleSet, word: str) -> NDArray[np.bool_]:
+    """Whether the name of each rule has a word in it, (R,)."""
     import pyarrow.compute as pc
 
-    return np.asarray(pc.match_substring(_names(count), word))
+    return np.asarray(pc.match_substring(_names(rule_set), word))

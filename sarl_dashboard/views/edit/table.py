@@ -157,7 +157,7 @@ def _have_word(
     edited_set: RuleSet, rule_set: RuleSet, place: Mapping[str, int], word: str
 ) -> NDArray[np.bool_]:
     """Whether the rules as edited have a word; what no edit changes is searched as it was."""
-    have = names_have_word(len(edited_set), word)
+    have = names_have_word(edited_set, word)
     was = have_word(rule_set, word)
     before = {rule.id: at for at, rule in enumerate(rule_set.rules)}
     for rule_id, at in place.items():

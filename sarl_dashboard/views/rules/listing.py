@@ -131,7 +131,7 @@ def have_words(rule_set: RuleSet, words: tuple[str, ...]) -> NDArray[np.bool_]:
     """Whether each rule has all words of a search, (R,)."""
     have = np.ones(len(rule_set), dtype=np.bool_)
     for word in words:
-        have &= have_word(rule_set, word) | names_have_word(len(rule_set), word)
+        have &= have_word(rule_set, word) | names_have_word(rule_set, word)
     return have
 
 
