@@ -137,15 +137,18 @@ def episodes_bar(place: Place[EpisodeBatch], rows: Sequence[Row], episodes: int)
     batch = place.job.result if place.job is not None else None
     keys = {row.key for row in rows}
     problems = batch.problems.items() if batch is not None else ()
-    ready = sum(some is not None and len(some) == episodes for some in known(rows, episodes))
-    done = "all done already" if ready == len(rows) else f"{ready} done already"
+    counts = [0 if some is None else len(some) for some in known(rows, episodes)]
+    ready = counts.count(episodes)
+    done = "all done already"
+    if ready < len(rows):
+        done = f"{sum(counts):,} of these {len(rows) * episodes:,} are done, and Run goes on there"
     run_bar(
         place,
         Offer(
             key=None,  # each row is kept by itself, so it goes on from whatever was run before
             start=lambda: run_batch(rows, episodes),
             about=f"{counted(episodes, 'episode')} for each of {counted(len(rows), 'setting')}"
-            f"{f'; {done}.' if ready else '.'}",
+            f"{f'; {done}.' if any(counts) else '.'}",
             complete=ready == len(rows),
             problems=sorted({str(error) for key, error in problems if key in keys}),
         ),

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from threading import Lock
 from typing import Protocol
+from weakref import WeakSet
 
 import streamlit as st
 
@@ -182,12 +183,37 @@ def run_batch(rows: Sequence[Row], episodes: int) -> Job[EpisodeBatch]:
     """
     batch = EpisodeBatch(tuple({row.key: row for row in reversed(rows)}.values())[::-1], episodes)
     known_episodes, executor = results(), processes()
-    return Job(
+    job = Job(
         None,
         lambda job: _run(job, batch, known_episodes, executor),
         len(batch.rows) * episodes,
         batch,
     )
+    _begun().add(job)
+    return job
+
+
+@st.cache_resource
+def _begun() -> WeakSet[Job[EpisodeBatch]]:
+    """The work of all sessions, as long as one of them or its thread knows it."""
+    return WeakSet()
+
+
+def take_up_work(place: Place[EpisodeBatch], rows: Sequence[Row]) -> None:
+    """Go on looking at work that was begun before this page was loaded anew.
+
+    Args:
+        place: Of the work.
+        rows: What is looked at; work on any of them is meant.
+    """
+    if place.job is not None:
+        return
+    keys = {row.key for row in rows}
+    for job in list(_begun()):
+        batch = job.result
+        if job.running and job.is_left and batch and keys & {row.key for row in batch.rows}:
+            place.take_up(job)
+            return
 
 
 def _run(

@@ -59,9 +59,7 @@ class Job(Generic[Result]):
         self.error: SarlError | None = None
         self._work = work
         self._cancelled = self._finished = False
-        context = get_script_run_ctx()
-        self._session = context.session_id if context is not None else ""
-        self._seen = time.monotonic()
+        self.take_over()
         Thread(target=self._run, daemon=True, name="job").start()
 
     @property
@@ -89,14 +87,24 @@ class Job(Generic[Result]):
         if not self._finished:
             self._cancelled = True
 
+    @property
+    def is_left(self) -> bool:
+        """Whether the page that began it is gone: closed, or loaded anew."""
+        try:
+            return not runtime.get_instance().is_active_session(self._session)
+        except RuntimeError:  # there is no server whose visitor could leave
+            return False
+
+    def take_over(self) -> None:
+        """Let it belong to the visitor whose page this is."""
+        context = get_script_run_ctx()
+        self._session = context.session_id if context is not None else ""
+        self._seen = time.monotonic()
+
     def wanted(self) -> bool:
         """Whether to go on; for the work itself."""
         now = time.monotonic()
-        try:
-            here = runtime.get_instance().is_active_session(self._session)
-        except RuntimeError:  # there is no server whose visitor could leave
-            here = True
-        if here:
+        if not self.is_left:
             self._seen = now
         return not self._cancelled and now - self._seen < GONE_AFTER
 
@@ -148,3 +156,8 @@ class Place(Generic[Result]):
         if self.job is not None:
             self.job.cancel()
         st.session_state[f"_job_{self.name}"] = start()
+
+    def take_up(self, job: Job[Result]) -> None:
+        """Look at work that another page began and left."""
+        job.take_over()
+        self.begin(lambda: job)

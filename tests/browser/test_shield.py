@@ -47,6 +47,22 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
     no_trace(screen)
 
 
+def test_a_page_that_is_loaded_anew_goes_on_looking_at_its_work(screen: Page) -> None:
+    # Enough work for minutes, on any machine.
+    query = "data=bipedal_walker&episodes=1000&agents=novice&shields=no+shield&first_seed=9000"
+    visit(screen, f"/measure?{query}", "Measure")
+    screen.get_by_role("button", name="Run", exact=True).click()
+    expect(screen.get_by_text("of 1000 episodes").first).to_be_visible(timeout=PATIENCE)
+    screen.reload()
+    expect(screen.get_by_text("of 1000 episodes").first).to_be_visible(timeout=PATIENCE)
+    screen.get_by_role("button", name="Cancel").click()
+    expect(screen.get_by_text("Cancelled.")).to_be_visible()
+    settle(screen)
+    visit(screen, screen.url, "Measure")
+    expect(screen.get_by_text("of these 1,000 are done, and Run goes on there")).to_be_visible()
+    no_trace(screen)
+
+
 def test_the_divider_is_studied(screen: Page) -> None:
     visit(screen, "/thresholds?data=pendulum&details=Divider&divider_episodes=3", "Thresholds")
     expect(screen.get_by_text("How far an action moves")).to_be_visible()

@@ -18,7 +18,7 @@ from sarl_dashboard.components.flips import flips_rate, flips_title, pace_of_pla
 from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.run_bar import episodes_bar, watched
 from sarl_dashboard.components.safety import freedom_cell, safety_column_config, safety_columns
-from sarl_dashboard.jobs.episodes import COMPARISON, known
+from sarl_dashboard.jobs.episodes import COMPARISON, known, take_up_work
 from sarl_dashboard.state.agents import AGENTS
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.shield.lines import ShieldLine
@@ -37,6 +37,7 @@ def comparison_of(lines: Sequence[ShieldLine], episodes: int) -> None:
         episodes: How many of each.
     """
     rows = [line.row for line in lines]
+    take_up_work(COMPARISON, rows)
 
     def outcome(at_work: bool) -> None:
         episodes_bar(COMPARISON, rows, episodes)

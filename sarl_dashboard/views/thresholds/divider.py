@@ -23,7 +23,7 @@ from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.run_bar import episodes_bar, watched
-from sarl_dashboard.jobs.episodes import EpisodeBatch, Row, known
+from sarl_dashboard.jobs.episodes import EpisodeBatch, Row, known, take_up_work
 from sarl_dashboard.jobs.job import Place
 from sarl_dashboard.session import is_dark
 from sarl_dashboard.state.agents import FRESH_SEED, ChosenAgent, agent_for, has_expert
@@ -139,6 +139,7 @@ def show_returns(demonstrations: Demonstrations, divided: Divided) -> None:
             "value in its interval, which is the action itself: that row is the expert as it is."
         )
 
+    take_up_work(PLACE, list(rows.values()))
     watched(PLACE, returns)
 
 
