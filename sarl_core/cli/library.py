@@ -390,7 +390,11 @@ def _facts(opened: Library, item: Item, versions: Sequence[Item]) -> list[tuple[
         ("kept", item.created.astimezone().strftime("%Y-%m-%d %H:%M:%S")),
         ("digest", item.digest),
         ("command", item.command),
-        *((key.replace("_", " "), _detail_text(value)) for key, value in item.details.items()),
+        *(
+            (key.replace("_", " "), _detail_text(value))
+            for key, value in item.details.items()
+            if key not in _FOR_MACHINES
+        ),
         *((_OF[item.kind], _source_text(opened, one)) for one in item.came_from),
         *(
             ("approved by", f"{one.author}{f': {one.note}' if one.note else ''}")
@@ -403,6 +407,9 @@ def _facts(opened: Library, item: Item, versions: Sequence[Item]) -> list[tuple[
     others = [one for one in versions if one.id != item.id]
     facts += [("other version", f"{one.id}, {one.created:%Y-%m-%d %H:%M}") for one in others]
     return [(name, value) for name, value in facts if value]
+
+
+_FOR_MACHINES = ("base",)  # a key that tells rules apart; what they are is said beside it
 
 
 def _detail_text(value: object) -> str:

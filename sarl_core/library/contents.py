@@ -131,6 +131,7 @@ def add_edits(
     base: str,
     *,
     author: str,
+    made_on: str = "",
 ) -> Item:
     """Keep edits, so that a link can name them; where their author keeps the same, that is it.
 
@@ -139,6 +140,7 @@ def add_edits(
         edits: The oldest first.
         base: What tells the rules that they were made on.
         author: Who made them.
+        made_on: What those rules are, in words.
 
     Raises:
         InputError: As of `Library.add`.
@@ -156,7 +158,7 @@ def add_edits(
         {"edits": (content, ".json")},
         author=author,
         digest=digest,
-        details={"base": base, "edits": count},
+        details={"base": base, "edits": count} | ({"made_on": made_on} if made_on else {}),
     )
 
 

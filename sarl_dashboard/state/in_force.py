@@ -15,7 +15,7 @@ from sarl_core.mining.editing.edits import Edit, History, check_edit
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.state import edits, library, rule_base
-from sarl_dashboard.state.data import data_problem
+from sarl_dashboard.state.data import chosen_dataset, data_problem, dataset_label
 from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.state.rule_files import CHOSEN, COMPACT_ENDINGS, EDITED, IN_FORCE, UNEDITED
 from sarl_dashboard.state.thresholds import THRESHOLDS
@@ -124,6 +124,11 @@ def rules() -> RuleSet:
     """
     base = rule_base.base()
     return edits.edited(base) if is_edited() else base.rule_set
+
+
+def in_address() -> bool:
+    """Whether the address names edits that are kept."""
+    return st.session_state.get("_edits_named", "") not in ("", UNKEPT)
 
 
 def count() -> int:
@@ -258,8 +263,9 @@ def _id_of(key: str) -> str:
     """The id under which the edits of some rules are kept."""
     made = edits.history_of(key).edits
     if (key, made) not in _ids():
+        words = f"{rule_base.labels()[rule_base.base_name()]}, {dataset_label(chosen_dataset())}"
         try:
-            _ids()[key, made] = library.keep_edits(made, key).id
+            _ids()[key, made] = library.keep_edits(made, key, words).id
         except SarlError as error:
             library.say_once(error)
             _ids()[key, made] = UNKEPT

@@ -379,17 +379,18 @@ def keep_rule_file(rule_set: RuleSet, name: str) -> Item:
     return add_rules(opened, rule_set, name, author=author())
 
 
-def keep_edits(edits: Sequence[Edit], base: str) -> Item:
+def keep_edits(edits: Sequence[Edit], base: str, made_on: str) -> Item:
     """Keep edits, for a link.
 
     Args:
         edits: The oldest first.
         base: What tells the rules that they were made on.
+        made_on: The same in words.
 
     Raises:
         SarlError: If they cannot be kept.
     """
-    return add_edits(library(), edits, base, author=author())
+    return add_edits(library(), edits, base, author=author(), made_on=made_on)
 
 
 def keep_rules(

@@ -9,6 +9,9 @@ import pytest
 
 from sarl_core import RuleSet
 from sarl_core.cli.app import main
+from sarl_core.library import Library
+from sarl_core.library.contents import add_edits
+from sarl_core.mining.editing.edits import Switch
 from tests.cli.conftest import CART, ROOT
 
 RULES = str(ROOT / "data" / "rules" / "cartpole_compact.json")
@@ -134,3 +137,18 @@ def test_a_library_that_cannot_be_made_is_said_in_one_sentence(place, capsys):
     place.write_text("a file where the folder should be")
     assert main(["library", "list"]) == 1
     assert "cannot be made" in capsys.readouterr().err
+
+
+def test_edits_say_in_words_what_they_were_made_on(run):
+    rules = RuleSet.load(RULES)
+    with Library() as library:
+        item = add_edits(
+            library,
+            [Switch(rules[0].id, on=False)],
+            "(('cartpole', 2), 'key')",
+            author="Ada",
+            made_on="At the thresholds, Cart Pole",
+        )
+    printed = run("library", "show", item.id)
+    assert "At the thresholds, Cart Pole" in printed
+    assert "key" not in printed
