@@ -8,6 +8,7 @@ from pathlib import Path
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import Shield, load_demonstrations, mine_rules
+from sarl_core.library import Library
 from sarl_core.mining.editing.edits import Add, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.language import share_text
@@ -326,3 +327,13 @@ def test_a_rule_by_hand_is_tried_on_what_this_visitor_held_out() -> None:
     own = split.mined.observations[split.mined.observations[:, 2] > 0]
     assert by_hand.box is not None
     assert by_hand.box.most == tuple(own.max(axis=0).tolist())
+
+
+def test_the_page_says_where_edits_are_that_nobody_kept_as_rules() -> None:
+    app = open_page("edit", data="cartpole")
+    assert "The address of this page holds these edits" not in texts(app)
+    click(app, "edit_switch")
+    assert "The address of this page holds these edits" in texts(app)
+    with Library() as library:
+        item = library.item("".join(app.query_params["edits"]))
+    assert item.details["made_on"] == "At the thresholds, Cart Pole"

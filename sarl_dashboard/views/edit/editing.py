@@ -46,4 +46,9 @@ def editing(of: Base) -> None:
     form.form(of, after)
     conflicts(of, after)
     if edits.history(of).edits and in_force.is_edited():
+        if in_force.in_address():
+            st.caption(
+                "The address of this page holds these edits, for you and for whoever has it. In "
+                "the list of the Library they stand once you keep the rules."
+            )
         keep_rules_form(after.rule_set, in_force=True)
