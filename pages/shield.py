@@ -11,10 +11,11 @@ import streamlit as st
 from sarl_core.errors import SarlError
 from sarl_dashboard.components.journey.environment_needed import require_environment
 from sarl_dashboard.components.run_bar import bars_at_work
-from sarl_dashboard.components.settings import known_seeds_notice
+from sarl_dashboard.components.settings import known_seeds_notice, other_data_notice
 from sarl_dashboard.jobs.episodes import COMPARISON
 from sarl_dashboard.session import end_page
 from sarl_dashboard.state.environments import demonstrated, environment_of
+from sarl_dashboard.state.rule_files import IN_FORCE
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.shield.lines import guards, line, pilots
 from sarl_dashboard.views.shield.settings import settings
@@ -27,6 +28,8 @@ st.caption(
 )
 require_environment(COMPARISON)
 choices = settings()
+if choices.from_demonstrations and IN_FORCE in choices.shields:
+    other_data_notice()
 try:
     env_id = environment_of(choices.env)
     agents = pilots(choices, env_id)

@@ -13,6 +13,7 @@ from sarl_core.shielding.shield import Outside
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import in_force, rule_base
 from sarl_dashboard.state.agents import FRESH_SEED, PROJECTIONS, PolicyFile, policy_upload
+from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.environments import AS_DEMONSTRATED, continuous, usual_environments
 from sarl_dashboard.state.rule_files import (
     CHOSEN,
@@ -28,6 +29,7 @@ from sarl_dashboard.state.rule_files import (
     PAPERS,
     UNEDITED,
     compact_sets,
+    fitting_demonstrations,
 )
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import escaped, in_full
@@ -230,6 +232,25 @@ def no_boxes_notice(rule_sets: list[RuleSet], outside: Outside) -> None:
             "Mine them again to have the boxes.",
             icon=":material/frame_inspect:",
         )
+
+
+def other_data_notice() -> bool:
+    """Say that the rules in force are of other data than the chosen ones.
+
+    Returns:
+        Whether they are.
+    """
+    demonstrations = chosen_demonstrations()
+    if rule_base.at_thresholds() or demonstrations is None:
+        return False
+    if fitting_demonstrations(rule_base.base().rule_set, demonstrations) is not None:
+        return False
+    st.info(
+        "The rules in force speak of other features or actions than the chosen demonstrations; "
+        "choose the demonstrations of their environment, or other rules, in the sidebar.",
+        icon=":material/swap_horiz:",
+    )
+    return True
 
 
 def known_seeds_notice() -> None:

@@ -232,3 +232,14 @@ def test_a_narrow_screen_is_told_which_rules_are_in_force() -> None:
     assert "Rules: " not in texts(open_page("rules", data="cartpole"))
     app = open_page("report", data="cartpole", set="compact")
     assert "Rules: Compact rules" in texts(app)
+
+
+@pytest.mark.parametrize("page", ["edit", "shield", "episodes", "what_if"])
+def test_rules_of_other_data_are_said_to_be_such(page: str) -> None:
+    with Library() as library:
+        item = add_rules(library, FILTERED, "of carts", author=usual_author())
+    said = "speak of other features or actions than the chosen demonstrations"
+    app = open_page(page, data="lunar_lander", set=item.id)
+    assert [said in info.value for info in app.info].count(True) == 1
+    assert not errors(app)
+    assert said not in texts(open_page(page, data="cartpole", set=item.id))

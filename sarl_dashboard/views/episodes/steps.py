@@ -17,6 +17,7 @@ from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.log_step import show_step
+from sarl_dashboard.components.settings import other_data_notice
 from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_room, show_legend
 from sarl_dashboard.session import end_page
 from sarl_dashboard.state import in_force
@@ -40,12 +41,8 @@ def show_episodes(demonstrations: Demonstrations) -> None:
     try:
         held = _held(in_force.rules(), demonstrations, episode)
     except InputError as error:
-        refuse(error)
-        st.info(
-            "The rules in force are not for these demonstrations; choose the demonstrations of "
-            "their environment, or other rules, in the sidebar.",
-            icon=":material/swap_horiz:",
-        )
+        if not other_data_notice():
+            refuse(error)
         end_page()
     with right:
         current = _number("Step", "step", held.steps - 1)

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import streamlit as st
-
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
-from sarl_dashboard.components.settings import notes_notice
+from sarl_dashboard.components.settings import notes_notice, other_data_notice
 from sarl_dashboard.session import end_page
 from sarl_dashboard.state import compact_set, edits, in_force, rule_base
 from sarl_dashboard.state.mined import grown_trees, rules_at
@@ -42,16 +40,10 @@ def chosen_rules(demonstrations: Demonstrations) -> RulesOnTrees:
             return RulesOnTrees(compact.counted, trees, True)
         if rule_base.at_thresholds():
             return RulesOnTrees(rules_at(), trees, False)
-    rules = in_force.rules()
-    fitted = fitting_demonstrations(rules, demonstrations)
-    if fitted is None:
-        st.info(
-            "The rules in force speak of other features or actions than the chosen demonstrations; "
-            "choose the demonstrations of their environment, or other rules, in the sidebar.",
-            icon=":material/swap_horiz:",
-        )
+    if other_data_notice():
         end_page()
-    rules, notes = rules_for(rules, fitted)
+    rules = in_force.rules()
+    rules, notes = rules_for(rules, fitting_demonstrations(rules, demonstrations) or demonstrations)
     notes_notice(notes)
     base = rule_base.base()
     own = edits.trees_with(base, edits.history(base).edits)
