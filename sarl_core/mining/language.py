@@ -20,6 +20,7 @@ from sarl_core.mining.rules import Bounds, Condition, Rule, share_bounds
 _DIGITS = 3
 _OFF = 0.1  # of the difference of two numbers, that each may be off
 _LONGEST = 120
+_SHORT_LIMIT = 6  # characters, as of 0.0046
 _IS = " is "
 _IS_NOT = " is not "
 _FLAG_WORDS = ("contact",)
@@ -67,6 +68,21 @@ def threshold_text(value: float) -> str:
         As "0.00005"; reads back as the same number.
     """
     return np.format_float_positional(value, trim="-")
+
+
+def limit_text(share: float) -> str:
+    """A threshold of support or confidence for people: as it was chosen, where that is short.
+
+    Args:
+        share: 0 to 1.
+
+    Returns:
+        As "0.005" or "0.002 %".
+    """
+    text = threshold_text(share)
+    if len(text) <= _SHORT_LIMIT:
+        return text
+    return f"{number_text(100 * share, apart_from=100.0 if share > 0.5 else 0.0)} %"
 
 
 def counted(count: int, noun: str) -> str:
@@ -557,8 +573,8 @@ def limits_text(rule_set: RuleContents) -> str:
     """
     thresholds = rule_set.thresholds
     limits = [
-        f"support at least {threshold_text(thresholds.support)}",
-        f"confidence at least {threshold_text(thresholds.confidence)}",
+        f"support at least {limit_text(thresholds.support)}",
+        f"confidence at least {limit_text(thresholds.confidence)}",
     ]
     if rule_set.cut == "leaves":
         limits = ["every leaf of the tree"]

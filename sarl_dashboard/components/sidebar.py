@@ -8,7 +8,7 @@ import streamlit as st
 
 from sarl_core.environments.formulas import Formula
 from sarl_core.errors import SarlError
-from sarl_core.mining.language import counted, threshold_text
+from sarl_core.mining.language import counted, limit_text, threshold_text
 from sarl_core.mining.rules import FILTERED
 from sarl_dashboard.components.hold_out import parting_lines
 from sarl_dashboard.components.journey.words import with_words
@@ -189,8 +189,8 @@ def sidebar(*, with_thresholds: bool = True) -> None:
         if not with_thresholds or not rule_base.at_thresholds():
             return
         lines = [
-            f"Support at least **{threshold_text(thresholds.support)}**",
-            f"Confidence at least **{threshold_text(thresholds.confidence)}**",
+            f"Support at least **{limit_text(thresholds.support)}**",
+            f"Confidence at least **{limit_text(thresholds.confidence)}**",
         ]
         if not demonstrations.is_discrete:
             lines.append(f"Divider **{divider}**")

@@ -13,6 +13,7 @@ from sarl_core.mining.language import (
     action_text,
     condition_text,
     conditions_text,
+    limit_text,
     number_text,
     sentence,
     share_text,
@@ -152,3 +153,21 @@ def test_actions_without_names_and_intervals_name_their_dimension() -> None:
     assert action_text(2, LabelledDimension("action", ("0", "1", "2"))) == "action 2"
     edges = np.linspace(-2, 2, 3).tolist()
     assert action_text(0, LabelledDimension.of_edges("torque", edges)) == "torque from -2 to 0"
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.005, "0.005"),
+        (0.95, "0.95"),
+        (1.0, "1"),
+        (0.0046, "0.0046"),
+        (2e-05, "0.002 %"),
+        (0.00002003, "0.002 %"),
+        (0.005166667, "0.517 %"),
+        (0.99999, "99.999 %"),
+        (0.9234567, "92.3 %"),
+    ],
+)
+def test_a_threshold_is_said_as_it_was_chosen_or_in_percent(share: float, text: str):
+    assert limit_text(share) == text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sarl_core.explaining.words.evidence import influence_text, range_text, what_tells
 from sarl_core.mining.evidence import FEWEST_EPISODES, HeldOut
-from sarl_core.mining.language import counted, share_text, threshold_text
+from sarl_core.mining.language import counted, limit_text, share_text
 from sarl_core.mining.validation.cross_fitting import Judged, parts
 from sarl_core.mining.validation.recommendation import COVERAGE, NEAR, Recommendation
 
@@ -136,8 +136,8 @@ def recommendation_sentences(recommendation: Recommendation, action: str = "") -
     )
     subject = "this rule applies" if rules == 1 else f"these {rules:,} rules apply"
     return (
-        f"Recommended{f' for {action}' if action else ''}: support {threshold_text(at.support)} "
-        f"and confidence {threshold_text(at.confidence)}. Elsewhere, {subject} in "
+        f"Recommended{f' for {action}' if action else ''}: support {limit_text(at.support)} "
+        f"and confidence {limit_text(at.confidence)}. Elsewhere, {subject} in "
         f"{share_text(recommendation.coverage)} of the states and {'is' if rules == 1 else 'are'} "
         f"right in {fidelity} of them ({unseen} in episodes without a say in this choice): {why} "
         f"of all that apply in at least {share_text(COVERAGE)} of the states."

@@ -20,7 +20,7 @@ from sarl_core.learning.summary import (
     reference,
     summarise_compared,
 )
-from sarl_core.mining.language import at_least_text, counted, share_text, threshold_text
+from sarl_core.mining.language import at_least_text, counted, limit_text, share_text
 from sarl_core.rollouts.choices import CHOICE_TEXTS
 from sarl_core.rollouts.episodes import MAX_STEPS, cut_text
 from sarl_core.rollouts.failures import freedom_text, interval_text
@@ -351,8 +351,8 @@ def _conditions(study: LearningStudy) -> str:
         cut = (
             "every leaf of its tree"
             if rules.get("cut") == "leaves"
-            else f"support {threshold_text(rules['support'])}, confidence "
-            f"{threshold_text(rules['confidence'])}"
+            else f"support {limit_text(rules['support'])}, confidence "
+            f"{limit_text(rules['confidence'])}"
         )
         by = f"{counted(int(rules['count']), 'rule')} ({cut})"
     seeds = len(study.seeds)

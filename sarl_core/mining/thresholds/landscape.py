@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.errors import InputError
 from sarl_core.mining.evidence import EpisodeCounts, EpisodeSums
+from sarl_core.mining.language import limit_text
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import PolicyTree, highest_above, several_trees
 from sarl_core.notebooks import table_html
@@ -134,8 +135,11 @@ class Landscape:
         lines = zip(self.supports[rows].tolist(), cells.tolist(), strict=True)
         return table_html(
             caption,
-            ["", *(f"{value:g}" for value in self.confidences[columns])],
-            ([f"{support:g}", *(f"{count:,}" for count in counts)] for support, counts in lines),
+            ["", *map(limit_text, self.confidences[columns].tolist())],
+            (
+                [limit_text(support), *(f"{count:,}" for count in counts)]
+                for support, counts in lines
+            ),
         )
 
 

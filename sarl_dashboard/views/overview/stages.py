@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.mining.language import counted, share_text, threshold_text
+from sarl_core.mining.language import counted, limit_text, share_text
 from sarl_core.mining.rules import FILTERED
 from sarl_dashboard.jobs.cross_fitting import known
 from sarl_dashboard.jobs.replays import latest
@@ -103,8 +103,8 @@ def _rules() -> Stage:
         return Stage("Rules", True, f"{in_force.title()} chosen", "thresholds.py")
     thresholds = chosen_thresholds()
     at = (
-        f"support at least {threshold_text(thresholds.support)}, confidence at least "
-        f"{threshold_text(thresholds.confidence)}"
+        f"support at least {limit_text(thresholds.support)}, confidence at least "
+        f"{limit_text(thresholds.confidence)}"
     )
     moved = thresholds != FILTERED
     return Stage(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import streamlit as st
 
-from sarl_core.mining.language import threshold_text
+from sarl_core.mining.language import limit_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_dashboard.components.lists.pages import follow, number_of_pages, page_choice
@@ -43,8 +43,8 @@ ORDERS = {
 def nothing_in_force(thresholds: Thresholds) -> None:
     """What to do where no rule is in force."""
     st.info(
-        f"No part of the tree has a support of at least {threshold_text(thresholds.support)} and a "
-        f"confidence of at least {threshold_text(thresholds.confidence)}, so there is no rule. "
+        f"No part of the tree has a support of at least {limit_text(thresholds.support)} and a "
+        f"confidence of at least {limit_text(thresholds.confidence)}, so there is no rule. "
         "Lower one of them on the Thresholds page, whose maps show where there are rules.",
         icon=":material/filter_alt_off:",
     )
