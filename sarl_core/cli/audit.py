@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import path_of, read_demonstrations
+from sarl_core.cli.inputs import path_of, read_demonstrations, sign_off_of
 from sarl_core.cli.options import (
     Columns,
     Json,
@@ -117,12 +117,11 @@ def audit(
         from sarl_core.auditing.comparison import LogComparison
         from sarl_core.auditing.guards import guard
         from sarl_core.explaining.exports.audit import audit_document
-        from sarl_core.library.contents import sign_off_at_hand
         from sarl_core.mining.rule_set import RuleSet
 
         guards = [guard(text) for text in fail_on or ()]
         rule_set = RuleSet.load(rules)
-        sign_off = sign_off_at_hand(rule_set)
+        sign_off = sign_off_of(rule_set)
         mined_from = (
             None
             if demonstrations is None

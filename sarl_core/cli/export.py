@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import read_demonstrations
+from sarl_core.cli.inputs import read_demonstrations, sign_off_of
 from sarl_core.cli.options import (
     Columns,
     EnvOfFile,
@@ -85,7 +85,6 @@ def export(
         )
     with terminal.working("Exporting"):
         from sarl_core.explaining.exports.export import prepare, save_export
-        from sarl_core.library.contents import sign_off_at_hand
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
@@ -95,7 +94,7 @@ def export(
             else read_demonstrations(demonstrations, env, columns, missing)
         )
         prepared = prepare(rule_set, merged=merged, demonstrations=given)
-        sign_off = sign_off_at_hand(prepared.rule_set)  # rounded or merged they are other rules
+        sign_off = sign_off_of(prepared.rule_set)  # rounded or merged they are other rules
         vectors = save_export(prepared, out, projection, on_invalid, sign_off)
         notes = (*(given.notes if given is not None else ()), *prepared.notes)
     if as_json:

@@ -12,7 +12,7 @@ from sarl_core.cli import terminal
 from sarl_core.cli.options import EVERY_PAIR, MINED, Derived
 from sarl_core.cli.stand_ins import called
 from sarl_core.environments.environment import Environment, EnvironmentOrId
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, SarlError
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -20,9 +20,11 @@ if TYPE_CHECKING:
     from sarl_core.agents.agent import Agent
     from sarl_core.demonstrations.dataset import Demonstrations
     from sarl_core.demonstrations.formats.mapping.roles import Roles
+    from sarl_core.explaining.words.sign_off import SignOff
     from sarl_core.mining.combining.candidates import Pair
     from sarl_core.mining.distributed.mined_data import MinedData
     from sarl_core.mining.distributed.mining import ClusterPlan
+    from sarl_core.mining.rule_set import RuleSet
     from sarl_core.progress import Progress
     from sarl_core.shielding.shield import Shield
 
@@ -164,6 +166,25 @@ def mine_on(
     combined = partial(pairs_of, derived=derived) if derived.pairs else None
     with cluster(address) as client:
         return mine_on_cluster(client, paths, reading, plan, pairs_of=combined, progress=advance)
+
+
+def sign_off_of(rule_set: RuleSet) -> SignOff | None:
+    """Who approved rules as they stand; why that is not known is said on standard error.
+
+    Args:
+        rule_set: With every edit.
+
+    Returns:
+        None where the library of this machine cannot be read: all else can be done without it.
+    """
+    from sarl_core.library.contents import sign_off_at_hand
+
+    try:
+        return sign_off_at_hand(rule_set)
+    except (SarlError, OSError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        terminal.print_notes([f"whether the rules are approved is not known: {why}"])
+        return None
 
 
 def with_wanted(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import read_agent, read_demonstrations
+from sarl_core.cli.inputs import read_agent, read_demonstrations, sign_off_of
 from sarl_core.cli.options import (
     Columns,
     Json,
@@ -111,13 +111,12 @@ def report(
         from sarl_core.explaining.report.report import make_report
         from sarl_core.explaining.report.thresholds import read_card
         from sarl_core.explaining.words.sign_off import approvals_document
-        from sarl_core.library.contents import sign_off_at_hand
         from sarl_core.mining.rule_set import RuleSet
 
         rule_set = RuleSet.load(rules)
         read = read_demonstrations(demonstrations, env, columns, missing)
         given = recoded(read, rule_set.source.features, called=called(demonstrations))
-        card, sign_off = read_card(rules), sign_off_at_hand(rule_set)
+        card, sign_off = read_card(rules), sign_off_of(rule_set)
         results = [one for path in comparison or () for one in read_results(path)]
         options: dict[str, object] = {
             "--demonstrations": called(demonstrations),

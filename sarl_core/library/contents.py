@@ -278,23 +278,24 @@ def rules_sign_off(library: Library, digest: str) -> SignOff:
     return sign_off_of(approval for item in items for approval in item.approvals)
 
 
-def sign_off_at_hand(rule_set: RuleSet) -> SignOff | None:
+def sign_off_at_hand(rule_set: RuleSet) -> SignOff:
     """Who approved rules as they stand, by the library of this machine; none is made for it.
 
     Args:
         rule_set: With every edit.
 
     Returns:
-        Nobody where there is no library; None where there is one and it cannot be read.
+        Nobody where there is no library.
+
+    Raises:
+        SarlError: If there is one and it cannot be read.
+        OSError: If its place cannot be looked into.
     """
-    try:
-        place = place_of()
-        if not is_there(place):
-            return SignOff()
-        with Library(place) as library:
-            return rules_sign_off(library, rules_digest(rule_set))
-    except (SarlError, OSError):  # what was asked for can be done without it
-        return None
+    place = place_of()
+    if not is_there(place):
+        return SignOff()
+    with Library(place) as library:
+        return rules_sign_off(library, rules_digest(rule_set))
 
 
 def digest_of_files(kind: Kind, files: Mapping[str, bytes]) -> str | None:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 
 import pytest
+from sqlalchemy import create_engine, text
 
+from sarl_core.cli.app import main
+from sarl_core.library import contents
 from tests.cli.conftest import CART, ROOT
 
 RULES = str(ROOT / "data" / "rules" / "cartpole_combined.json")
@@ -69,6 +72,29 @@ def test_where_nothing_is_known_nobody_has_approved(run, place, tmp_path):
     assert not place.exists()
     run("library", "import", RULES)
     assert json.loads(run("audit", RULES, CART, "--json"))["approved"] == []
+
+
+def test_a_library_of_a_newer_version_is_said_to_be_one(run, approved, place, capsys):
+    engine = create_engine(f"sqlite:///{place / 'library.sqlite3'}")
+    with engine.begin() as connection:
+        connection.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    engine.dispose()
+    for command in (("audit", RULES, CART), ("audit", RULES, CART, "--json")):
+        assert main([*command]) == 0
+        out, error = capsys.readouterr()
+        assert SAYS not in out
+        (note,) = error.splitlines()
+        assert note.startswith("note: whether the rules are approved is not known: the library in")
+        assert "was made by a newer version" in note
+
+
+def test_a_place_that_may_not_be_looked_into_is_said_to_be_one(monkeypatch, capsys):
+    def forbidden(_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(contents, "is_there", forbidden)
+    assert main(["audit", RULES, CART]) == 0
+    assert "is not known: Permission denied" in capsys.readouterr().err
 
 
 def test_a_library_that_cannot_be_opened_stops_nothing(run, place, tmp_path):

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from sarl_core import RuleSet
+from sarl_core.errors import SarlError
 from sarl_core.explaining.words.sign_off import SignOff
-from sarl_core.library import Library, contents
+from sarl_core.library import Library
 from sarl_core.library.contents import add_rules, rules_sign_off, sign_off_at_hand
 from sarl_core.library.database import is_there
 from sarl_core.library.place import LibraryPlace
@@ -88,35 +89,16 @@ def test_where_there_is_no_library_nobody_has_approved(
     with Library() as library:
         item = add_rules(library, rules, "rules", author="Ada")
         library.approve(item.id, author="Eve")
-    known = sign_off_at_hand(rules)
-    assert known is not None
-    assert [one.author for one in known.approvals] == ["Eve"]
+    assert [one.author for one in sign_off_at_hand(rules).approvals] == ["Eve"]
 
 
 @pytest.mark.parametrize(
     "address",
     ["postgresql://127.0.0.1:1/none", "mysql://host/database", "postgresql://host:port/x"],
 )
-def test_a_library_that_cannot_be_reached_says_nothing(
+def test_a_library_that_cannot_be_reached_is_an_error_of_ours(
     rules: RuleSet, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SARL_LIBRARY", address)
-    assert sign_off_at_hand(rules) is None
-
-
-def test_what_is_no_library_says_nothing(
-    rules: RuleSet, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("SARL_LIBRARY", str(tmp_path))
-    (tmp_path / "library.sqlite3").write_bytes(b"something else" * 100)
-    assert sign_off_at_hand(rules) is None
-
-
-def test_a_folder_that_may_not_be_looked_into_says_nothing(
-    rules: RuleSet, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def forbidden(_: LibraryPlace) -> bool:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(contents, "is_there", forbidden)
-    assert sign_off_at_hand(rules) is None
+    with pytest.raises(SarlError):
+        sign_off_at_hand(rules)
