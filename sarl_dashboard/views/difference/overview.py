@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import pandas as pd
 import streamlit as st
 
 from sarl_core.explaining.html.table import Column, table_html
@@ -25,13 +24,15 @@ def show_overview(sides: Sequence[Side], different: Callable[[Side, Side], float
         st.html(table_html(_COLUMNS, lines, "What each rule set comes to"))
     if len(sides) > 2:
         st.caption("Share of the states that two of them decide differently:")
-        st.dataframe(
-            _differences(sides, different),
-            hide_index=True,
-            width="content",
-            key="different_decisions",
-            alt="How often two of the rule sets decide differently",
-        )
+        columns = (Column("Rule set"), *(Column(side.name, "n") for side in sides[:-1]))
+        with st.container(width=_WIDTH):
+            st.html(
+                table_html(
+                    columns,
+                    _differences(sides, different),
+                    "How often two of the rule sets decide differently",
+                )
+            )
 
 
 _WIDTH = 560  # pixels, where there are so many
@@ -56,11 +57,12 @@ def _line(side: Side) -> tuple[str, ...]:
     )
 
 
-def _differences(sides: Sequence[Side], different: Callable[[Side, Side], float]) -> pd.DataFrame:
-    columns: dict[str, list[str]] = {"Rule set": [side.name for side in sides]}
-    for one in sides:
-        columns[one.name] = [
-            "–" if one is other else share_text(different(one, other), decimals=1)
-            for other in sides
-        ]
-    return pd.DataFrame(columns)
+def _differences(
+    sides: Sequence[Side], different: Callable[[Side, Side], float]
+) -> list[tuple[str, ...]]:
+    """A row for each set but the first, against those before it."""
+    rows = []
+    for place, one in enumerate(sides[1:], start=1):
+        shares = [share_text(different(other, one), decimals=1) for other in sides[:place]]
+        rows.append((one.name, *shares, *[""] * (len(sides) - 1 - place)))
+    return rows
