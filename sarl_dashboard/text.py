@@ -28,7 +28,8 @@ def in_full(text: str) -> str:
     """A message as a sentence; what begins with a name, as of a file, keeps its first letter."""
     text = on_page(text)
     first = text.split(" ", 1)[0]
-    return _with_code(text[:1].upper() + text[1:] if first.isalpha() else text) + "."
+    end = "" if text.endswith("?") else "."
+    return _with_code(text[:1].upper() + text[1:] if first.isalpha() else text) + end
 
 
 def _with_code(text: str) -> str:

@@ -397,7 +397,10 @@ def _facts(opened: Library, item: Item, versions: Sequence[Item]) -> list[tuple[
         ),
         *((_OF[item.kind], _source_text(opened, one)) for one in item.came_from),
         *(
-            ("approved by", f"{one.author}{f': {one.note}' if one.note else ''}")
+            (
+                "approved by",
+                f"{one.author}, {_time_text(one.created)}{f': {one.note}' if one.note else ''}",
+            )
             for one in item.approvals
         ),
         *(("file", str(opened.path(item, one.role))) for one in item.files),

@@ -409,7 +409,7 @@ class _Parser:
         raise self._error(
             "is no feature",
             token,
-            f"did you mean {near[0]!r}"
+            f"did you mean {near[0]!r}?"
             if near
             else f"the features are {shortened(self.names)} (a name with other signs than letters, "
             "digits and spaces stands in quotation marks)",

@@ -127,3 +127,16 @@ def table_height(rows: int, most: int, row: int = ROW_HEIGHT) -> int | Literal["
     """As high as its rows, or as so many of them; where rows are high, as fewer."""
     high = (most + 1) * ROW_HEIGHT + ROW_HEIGHT // 2
     return "content" if ROW_HEIGHT + rows * row <= high else high
+
+
+def select_row(row: int | None, key: str) -> None:
+    """Select a row of a table, or none, before it is drawn; it keeps a choice of its own.
+
+    Args:
+        row: From 0.
+        key: Of the table.
+    """
+    table = st.session_state.get(key)
+    rows = [] if row is None else [row]
+    if table is not None and list(table["selection"]["rows"]) != rows:
+        st.session_state[key] = {"selection": {"rows": rows}}

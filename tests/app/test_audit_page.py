@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 from streamlit.testing.v1 import AppTest
@@ -41,6 +43,15 @@ def test_a_log_is_held_against_the_rules() -> None:
     assert "Asked on the way" in html(app)
     links = [link.proto.page for link in app.get("page_link")]
     assert {"rules", "what_if"} <= set(links)
+    shown = re.search(r"Step (\d+) of episode (\d+)", texts(app))
+    assert shown is not None
+    rows = np.flatnonzero(demonstrations.episodes == int(shown[2]))
+    app.query_params["log_row"] = str(rows[int(shown[1]) + 3])
+    app.run()
+    assert f"Step {int(shown[1]) + 3} of episode {shown[2]}" in texts(app)
+    app.query_params["log_row"] = str(rows[0] - 1)  # of another episode
+    app.run()
+    assert shown[0] in texts(app)
     app.file_uploader(key="other_log_file").set_value(upload(DATA / "cartpole.parquet"))
     app.run()
     assert "Nothing shows that the two logs differ" in texts(app)

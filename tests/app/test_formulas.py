@@ -107,7 +107,7 @@ def test_a_formula_is_changed_and_two_stand_beside_each_other() -> None:
         ("time", "is no feature; write its name, its unit in brackets and its formula"),
         (
             "rate = cart_velocty / 2",
-            "'cart_velocty' (sign 1) is no feature; did you mean 'cart velocity'",
+            "'cart_velocty' (sign 1) is no feature; did you mean 'cart velocity'?",
         ),
         ("rate = cart velocity /", "the end (sign 16) stands where a number"),
         (f"rate = {'(' * 51}pole angle{')' * 51}", "lies more than 50 deep"),

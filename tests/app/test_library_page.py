@@ -6,6 +6,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -214,6 +215,11 @@ def test_a_bundle_is_brought_and_a_wrong_one_refused(tmp_path: Path) -> None:
         library.item(new_id())
 
 
+def ticked(app: AppTest) -> list[int]:
+    """The rows of the list that are chosen in it."""
+    return list(app.session_state["library_table"]["selection"]["rows"])
+
+
 def test_rules_are_kept_as_versions_and_approved_one_by_one() -> None:
     app = open_page("export", data="cartpole")
     app.text_input(key="keep_name").set_value("for the crane").run()
@@ -232,9 +238,13 @@ def test_rules_are_kept_as_versions_and_approved_one_by_one() -> None:
     app = open_page("library", item=first.id)
     app.text_area(key=f"approval_{first.id}").set_value("held against the logs").run()
     app.button(key="library_approve").click().run()
-    assert "Approved by **Ada**: held against the logs" in texts(app)
+    today = datetime.now(UTC)
+    said = f"Approved by Ada on {today.day} {today:%B %Y}: held against the logs."
+    assert said in texts(app)
+    assert ticked(app) == [1]
     app.button(key=f"version_{second.id}").click().run()
     assert app.query_params["item"] == second.id
+    assert ticked(app) == [0]
     assert "Approved by" not in texts(app)
 
 

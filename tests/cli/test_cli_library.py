@@ -82,7 +82,8 @@ def test_a_set_travels_as_one_file(run, tmp_path, monkeypatch):
     listed = {one["id"]: one for one in json.loads(run("library", "list", "--json"))["items"]}
     assert set(listed) == {data["id"], rules["id"]}
     assert listed[rules["id"]]["approvals"][0]["note"] == "held against the logs"
-    assert "Ada: held against the logs" in run("library", "show", rules["id"])
+    printed = run("library", "show", rules["id"])
+    assert re.search(r"Ada, \d{4}-\d\d-\d\d \d\d:\d\d: held against the logs", printed)
 
 
 def test_removing_can_be_undone(run):

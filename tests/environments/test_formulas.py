@@ -80,7 +80,7 @@ def test_it_is_worked_out_in_float64_from_float32(values: tuple[float, float]) -
     ("text", "says"),
     [
         ("", "is empty"),
-        ("gapp > 1", "'gapp' (sign 1) is no feature; did you mean 'gap'"),
+        ("gapp > 1", "'gapp' (sign 1) is no feature; did you mean 'gap'?"),
         ("__import__('os')", "is no feature"),
         ("gap.real", "'.' (sign 4)"),
         ("gap ** 2", "'*' (sign 6)"),

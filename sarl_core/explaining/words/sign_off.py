@@ -66,7 +66,7 @@ def sign_off_text(sign_off: SignOff | None) -> str:
     """
     if sign_off is None:
         return ""
-    return " ".join(map(_sentence, sign_off.approvals)) or "Not approved by anybody."
+    return " ".join(map(approval_text, sign_off.approvals)) or "Not approved by anybody."
 
 
 def approvals_document(sign_off: SignOff | None) -> list[dict[str, Any]] | None:
@@ -83,7 +83,8 @@ def approvals_document(sign_off: SignOff | None) -> list[dict[str, Any]] | None:
     return [one.document for one in sign_off.approvals]
 
 
-def _sentence(approval: Approval) -> str:
+def approval_text(approval: Approval) -> str:
+    """That somebody has approved something, as a sentence of `sign_off_text`."""
     created = approval.created.astimezone(UTC)
     text = f"Approved by {_line(approval.author)} on {created.day} {created:%B %Y}"
     if note := _line(approval.note):

@@ -71,7 +71,7 @@ def show(ablation: Ablation, choice: AblationChoice, *, at_work: bool) -> None:
             ),
         )
     if not at_work:
-        st.markdown("\n".join(f"- {escaped(text)}" for text in ablation_text(ablation)))
+        st.markdown("\n\n".join(map(escaped, ablation_text(ablation))))
         if left := left_out_text(ablation):
             st.info(left, icon=":material/filter_list:")
     if not ablation.rules:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+import re
+from functools import partial
 
 import numpy as np
 import streamlit as st
@@ -14,10 +15,12 @@ from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.words.audit import stretch_text
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.log_step import show_step
-from sarl_dashboard.components.timeline import show_legend
+from sarl_dashboard.components.timeline import clicked_step, show_legend
+from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.audit.logs import ChosenRules
 
+_ROW = r"(?:[0-9]{1,12})?"
 _MOST_STEPS = 2_000  # of an episode that are drawn; a longer one is cut to where it broke rules
 
 
@@ -38,17 +41,22 @@ def show_timeline(rules: ChosenRules, held: Audit) -> None:
     rows = _chosen_episode(held)
     tracks = audit_tracks(held, rows)
     timeline = Timeline.of(tracks, rows.stop - rows.start)
-    picked: Any = st.plotly_chart(
+    st.plotly_chart(
         intervention_strip(tracks, step_texts(held, rows), timeline),
         config={"displayModeBar": False},
         key="audit_strip",
-        on_select="rerun",
+        on_select=partial(_pick, rows.start),
         selection_mode="points",
         alt="What was done at each step, what the rule in force says, and the breaks",
     )
     show_legend(held.rule_set.actions, marks="broken")
-    points = picked["selection"]["points"]
-    _step(rules, held, rows, int(points[0]["customdata"][0]) if points else None)
+    _step(rules, held, rows)
+
+
+def _pick(start: int) -> None:
+    """Let the address name the row of the log that was clicked (URL: log_row)."""
+    step = clicked_step("audit_strip")
+    set_url_choice("log_row", "" if step is None else str(start + step))
 
 
 def _chosen_episode(held: Audit) -> slice:
@@ -74,13 +82,14 @@ def _chosen_episode(held: Audit) -> slice:
     return slice(start + first, start + first + _MOST_STEPS)
 
 
-def _step(rules: ChosenRules, held: Audit, rows: slice, clicked: int | None) -> None:
-    """One step: the first that broke a rule where none was clicked."""
-    broken = np.flatnonzero(held.is_broken[rows])
-    if clicked is None:
+def _step(rules: ChosenRules, held: Audit, rows: slice) -> None:
+    """One step: the first that broke a rule where none of this episode was clicked."""
+    named = url_text("log_row", "", lambda text: re.fullmatch(_ROW, text) is not None)
+    row = int(named or -1)
+    if row not in range(rows.start, rows.stop):
+        broken = np.flatnonzero(held.is_broken[rows])
         if not len(broken):
             st.caption("No rule was broken in this episode. Click a step to see its rule.")
             return
-        clicked = int(broken[0])
-    row = rows.start + min(clicked, rows.stop - rows.start - 1)
+        row = rows.start + int(broken[0])
     show_step(held, row, rules.choice)

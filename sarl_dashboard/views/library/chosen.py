@@ -12,6 +12,7 @@ from typing import Any
 import streamlit as st
 
 from sarl_core.errors import SarlError
+from sarl_core.explaining.words.sign_off import approval_text
 from sarl_core.library import Item, Library
 from sarl_core.library.bundles import ENDING, export_bundle
 from sarl_core.library.contents import rules_of
@@ -62,8 +63,7 @@ def show_chosen(opened: Library, item: Item, author: str) -> None:
         if item.command:
             st.code(item.command, language="sh")
         for approval in item.approvals:
-            note = f": {escaped(approval.note)}" if approval.note else ""
-            st.markdown(f":material/verified: Approved by **{escaped(approval.author)}**{note}")
+            st.markdown(f":material/verified: {escaped(approval_text(approval))}")
         show_content(opened, item)
         address = str(item.details.get("address", ""))
         if _ADDRESS.fullmatch(address):

@@ -15,7 +15,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.library import Item, Library
 from sarl_core.library.bundles import ENDING, import_bundle
 from sarl_core.mining.language import counted
-from sarl_dashboard.components.tables import table_height
+from sarl_dashboard.components.tables import select_row, table_height
 from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import refuse
 
@@ -66,12 +66,16 @@ def choose_item(opened: Library, author: str) -> Item | None:
     if not items:
         st.caption("Nothing here has that in its name.")
         return item
+    identifiers = [one.id for one in items]
+    row = identifiers.index(named) if named in identifiers else None
+    select_row(row, "library_table")
     st.dataframe(
         _table(items, author),
         hide_index=True,
         height=table_height(len(items), 12),
-        on_select=partial(_choose, [one.id for one in items]),
+        on_select=partial(_choose, identifiers),
         selection_mode="single-row",
+        selection_default={"selection": {"rows": [] if row is None else [row]}},
         key="library_table",
         column_config={
             "Kept": st.column_config.DatetimeColumn(format="D MMM YYYY, HH:mm"),

@@ -10,7 +10,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_dashboard.components.lists.pages import follow, number_of_pages, page_choice
 from sarl_dashboard.components.settings import switch
-from sarl_dashboard.components.tables import column_config, row_height, table_height
+from sarl_dashboard.components.tables import column_config, row_height, select_row, table_height
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import digest_of
@@ -205,11 +205,3 @@ def pick(rule_set: RuleSet, places: Places, key: str) -> None:
     rows = st.session_state[key]["selection"]["rows"]
     if rows and rows[0] < len(places):
         set_url_choice("rule", rule_set[int(places[rows[0]])].id)
-
-
-def select_row(row: int | None, key: str) -> None:
-    """Select a row of the table, or none, before it is drawn; it keeps a choice of its own."""
-    table = st.session_state.get(key)
-    rows = [] if row is None else [row]
-    if table is not None and list(table["selection"]["rows"]) != rows:
-        st.session_state[key] = {"selection": {"rows": rows}}
