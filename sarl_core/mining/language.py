@@ -20,7 +20,6 @@ from sarl_core.mining.rules import Bounds, Condition, Rule, share_bounds
 _DIGITS = 3
 _OFF = 0.1  # of the difference of two numbers, that each may be off
 _LONGEST = 120
-_SHORT_LIMIT = 6  # characters, as of 0.0046
 _IS = " is "
 _IS_NOT = " is not "
 _FLAG_WORDS = ("contact",)
@@ -79,10 +78,9 @@ def limit_text(share: float) -> str:
     Returns:
         As "0.005" or "0.002 %".
     """
-    text = threshold_text(share)
-    if len(text) <= _SHORT_LIMIT:
-        return text
-    return f"{number_text(100 * share, apart_from=100.0 if share > 0.5 else 0.0)} %"
+    text, end = threshold_text(share), 100.0 if share > 0.5 else 0.0
+    long = len(text) > len("0.0046")
+    return f"{number_text(100 * share, apart_from=end)} %" if long else text
 
 
 def counted(count: int, noun: str) -> str:
