@@ -17,9 +17,6 @@ from tests.app.screens import ROUTER, errors, html, metrics, open_page, texts
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
 
 
-pytestmark = pytest.mark.usefixtures("place")
-
-
 def upload(path: Path) -> tuple[str, bytes, str]:
     return path.name, path.read_bytes(), "application/octet-stream"
 

@@ -11,8 +11,6 @@ from sarl_core.library.results import add_result
 from sarl_dashboard.jobs.improving import outcome_cache
 from tests.app.screens import errors, metrics, open_page, run_through, texts
 
-pytestmark = pytest.mark.usefixtures("place")
-
 
 def results() -> list[Item]:
     with Library() as library:

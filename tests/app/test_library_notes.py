@@ -18,9 +18,6 @@ from tests.app.screens import errors, html, open_page, texts
 SCRIPT = "<script>alert(1)</script> *not* `so`"
 
 
-pytestmark = pytest.mark.usefixtures("place")
-
-
 @pytest.fixture
 def rules() -> Item:
     from sarl_core import RuleSet

@@ -25,9 +25,6 @@ DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 ROWS = b"obs_speed,action,episode\n0.5,0,0\n1.5,1,0\n0.25,0,1\n2.5,1,1\n0.1,0,1\n"
 
 
-pytestmark = pytest.mark.usefixtures("place")
-
-
 def upload(app: AppTest, content: bytes = ROWS, name: str = "crane.csv") -> str:
     """What the address calls it then."""
     app.file_uploader(key="upload_files").set_value([(name, content, "text/csv")]).run()

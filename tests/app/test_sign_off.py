@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 from pathlib import Path
 
-import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet
@@ -18,9 +17,6 @@ DATA = ROUTER.parents[1] / "data"
 LOG = DATA / "demonstrations" / "cartpole.parquet"
 NOBODY = "Not approved by anybody."
 COMBINED = "compact, two features"
-
-
-pytestmark = pytest.mark.usefixtures("place")
 
 
 def approve() -> None:
