@@ -226,3 +226,24 @@ def test_what_cannot_be_read_is_not_kept() -> None:
     assert len(errors(app)) == 1
     assert logs() == []
     assert "log" not in address(app)
+
+
+def test_actions_of_other_names_are_named_in_the_form(tmp_path: Path) -> None:
+    log = load_demonstrations(DATA / "lunar_lander_continuous.parquet").select(range(2))
+    columns = dict(zip(log.feature_names, log.observations.T, strict=True))
+    first, second = (dimension.name for dimension in log.action_dimensions)
+    done = {"action_u": log.actions[:, 0], "action_w": log.actions[:, 1]}
+    path = tmp_path / "lab.csv"
+    pd.DataFrame({"run": log.episodes, **columns, **done}).to_csv(path, index=False)
+    app = open_page("audit", data="lunar_lander_continuous")
+    app.file_uploader(key="log_file").set_value(upload(path)).run()
+    assert f"the log has no {first}, {second}" in errors(app)[0]
+    field = app.selectbox(key=f"log_map_action called {first}")
+    assert field.options == ["action_u", "action_w"]
+    field.set_value("action_u").run()
+    app.selectbox(key=f"log_map_action called {second}").set_value("action_w").run()
+    app.button(key="log_map_read").click().run()
+    assert not errors(app)
+    again = open_page("audit", **address(app))
+    assert not errors(again)
+    assert metrics(again) == metrics(app)
