@@ -14,6 +14,10 @@ from .explaining.report.report import make_report as make_report
 from .mining.algorithm_1 import mine_rules as mine_rules
 from .mining.classifier import RuleClassifier as RuleClassifier
 from .mining.combining.choice import with_combinations as with_combinations
+from .mining.distributed.mined_data import MinedData as MinedData
+from .mining.distributed.mined_files import load_mined_data as load_mined_data
+from .mining.distributed.mined_files import save_mined_data as save_mined_data
+from .mining.distributed.mining import mine_files as mine_files
 from .mining.growing.growth import grow_policy_trees as grow_policy_trees
 from .mining.rule_set import RuleSet as RuleSet
 from .mining.rule_set import load_rules as load_rules

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from sarl_core.cli import terminal
 from sarl_core.cli.options import EVERY_PAIR, MINED, Derived
 from sarl_core.cli.stand_ins import called
-from sarl_core.environments.environment import Environment, EnvironmentOrId
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError
 
 if TYPE_CHECKING:
@@ -22,10 +21,7 @@ if TYPE_CHECKING:
     from sarl_core.demonstrations.formats.mapping.roles import Roles
     from sarl_core.explaining.words.sign_off import SignOff
     from sarl_core.mining.combining.candidates import Pair
-    from sarl_core.mining.distributed.mined_data import MinedData
-    from sarl_core.mining.distributed.mining import ClusterPlan
     from sarl_core.mining.rule_set import RuleSet
-    from sarl_core.progress import Progress
     from sarl_core.shielding.shield import Shield
 
 
@@ -124,48 +120,6 @@ def workers_at(address: str | None) -> AbstractContextManager[Executor | None]:
     from sarl_core.clusters import cluster_executor
 
     return cluster_executor(address)
-
-
-def mine_on(
-    address: str,
-    files: Sequence[Path],
-    env: Environment | None,
-    columns: Roles,
-    missing: Literal["refuse", "drop"],
-    derived: Derived,
-    plan: ClusterPlan,
-    advance: Progress,
-) -> MinedData:
-    """Mine Parquet files on a cluster.
-
-    Args:
-        address: Of the option ``--cluster``.
-        files: As the argument names them.
-        env: Of the option ``--env``, or None.
-        columns: What was said of columns.
-        missing: Of the option ``--missing``.
-        derived: Of the options ``--combine`` and ``--feature``.
-        plan: What is to be mined.
-        advance: Told how far it is.
-
-    Returns:
-        The trees, and what was counted.
-
-    Raises:
-        InputError: If a file, or the cluster, cannot be used.
-        WorkError: If the cluster cannot go on.
-    """
-    from sarl_core.clusters import cluster
-    from sarl_core.environments.description import describe_environment
-    from sarl_core.mining.distributed.mining import mine_on_cluster
-    from sarl_core.mining.distributed.pieces import Reading, parquet_paths
-
-    paths = parquet_paths(files)
-    description = None if env is None else describe_environment(env)
-    reading = Reading(columns or None, description, missing, derived.formulas)
-    combined = partial(pairs_of, derived=derived) if derived.pairs else None
-    with cluster(address) as client:
-        return mine_on_cluster(client, paths, reading, plan, pairs_of=combined, progress=advance)
 
 
 def sign_off_of(rule_set: RuleSet) -> SignOff | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,7 +11,6 @@ import typer
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import (
     is_mined_file,
-    mine_on,
     pairs_of,
     path_of,
     read_demonstrations,
@@ -34,9 +34,6 @@ from sarl_core.cli.options import (
 )
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError
-
-_FLOOR = 0.0001
-"""Support down to which trees of a mined file are grown, unless one is given."""
 
 
 @with_environment
@@ -304,11 +301,24 @@ def _mine_at_a_distance(
         if cluster is None:
             mined = load_mined_data(files[0])
         else:
-            from sarl_core.mining.distributed.mining import ClusterPlan
+            from sarl_core.mining.distributed.mining import mine_files
 
-            floor = _FLOOR if into_mined and named == [False] * 3 else pair[0]
-            plan = ClusterPlan(divider, floor, max_depth, hold_out or 0.0, seed)
-            mined = mine_on(cluster, files, env, columns, missing, derived, plan, advance)
+            floor = {} if into_mined and named == [False] * 3 else {"min_support": pair[0]}
+            mined = mine_files(
+                files,
+                cluster,
+                env_id=env,
+                columns=columns,
+                missing=missing,
+                formulas=derived.formulas,
+                pairs_of=partial(pairs_of, derived=derived) if derived.pairs else None,
+                divider=divider,
+                max_depth=max_depth,
+                hold_out=hold_out or 0.0,
+                seed=seed,
+                progress=advance,
+                **floor,
+            )
         if into_mined:
             save_mined_data(mined, out)
         else:

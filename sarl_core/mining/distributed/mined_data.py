@@ -49,7 +49,7 @@ class FeatureHistogram:
         return float(self.borders[min(int(most), len(self.borders) - 1)])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MinedData:
     """Trees over N pairs, and what was counted of all of these.
 
@@ -74,6 +74,14 @@ class MinedData:
     share: float = 0.0
     seed: int = 0
     min_support: float = 0.0
+
+    def __repr__(self) -> str:
+        """Its size, as `MinedData(steps=900000, episodes=900, nodes=57869, sample=50000)`."""
+        source = self.trees[0].source
+        return (
+            f"MinedData(steps={source.steps}, episodes={source.episodes}, "
+            f"nodes={sum(tree.n_nodes for tree in self.trees)}, sample={len(self.sample)})"
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -6,22 +6,34 @@ import hashlib
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.clusters import cluster as connected
 from sarl_core.clusters import saying_losses
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import InputError
+from sarl_core.demonstrations.formats.columns import Columns, stated
+from sarl_core.demonstrations.formats.missing import Missing
+from sarl_core.environments.description import describe_environment
+from sarl_core.environments.environment import EnvironmentOrId
+from sarl_core.errors import InputError, quoted, require
 from sarl_core.mining.combining.candidates import Pair
 from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.mining.distributed.binning import bin_counts, bin_piece, label_counts
 from sarl_core.mining.distributed.counting import TreeCounts, at_nodes, count_piece, together
 from sarl_core.mining.distributed.growth import DistributedGrowth, added_up
 from sarl_core.mining.distributed.mined_data import FeatureHistogram, MinedData, boxes_of
-from sarl_core.mining.distributed.pieces import Piece, Reading, pieces_of, some_rows
+from sarl_core.mining.distributed.pieces import (
+    Piece,
+    Reading,
+    parquet_paths,
+    pieces_of,
+    some_rows,
+)
 from sarl_core.mining.distributed.survey import (
     Layout,
     columns_of_head,
@@ -67,6 +79,65 @@ class ClusterPlan:
     seed: int = 0
 
 
+def mine_files(
+    paths: str | Path | Sequence[str | Path],
+    cluster: str,
+    *,
+    env_id: EnvironmentOrId | None = None,
+    columns: Columns | None = None,
+    missing: Missing = "refuse",
+    formulas: Sequence[str] = (),
+    pairs_of: Callable[[Demonstrations], tuple[Pair, ...]] | None = None,
+    divider: int = 2,
+    min_support: float = 0.0001,
+    max_depth: int | None = None,
+    hold_out: float = 0.0,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> MinedData:
+    """Mine Parquet files that no single memory holds, on a cluster of Dask.
+
+    The same files, or the same rows cut into others, give the same trees, however many workers
+    there are.
+
+    Args:
+        paths: Files, folders of them, or patterns as `fleet/*.parquet`; the workers see them under
+            the same paths.
+        cluster: The address of a scheduler, as "tcp://scheduler:8786"; or "local:2" for two
+            processes of this machine, "local:2:4GB" with so much memory each.
+        env_id: As of `load_demonstrations`.
+        columns: Likewise.
+        missing: Likewise.
+        formulas: Features that a person wants derived, as of `with_formulas`.
+        pairs_of: Says of a sample which pairs of features may be combined; None for none.
+        divider: Number of intervals of continuous dimensions.
+        min_support: No node with less is split further: no rule with less is found.
+        max_depth: Of the trees; None for no limit.
+        hold_out: Share of the episodes to hold out, drawn by their own numbers; 0 for none.
+        seed: Draws these, and chooses among equally good queries.
+        progress: Told how far it is; may stop it.
+
+    Returns:
+        The trees, and what was counted: `MinedData.mine` gives rules.
+
+    Raises:
+        InputError: If a file, or the cluster, cannot be used.
+        WorkError: If the cluster cannot go on, or the extra "cluster" is not installed.
+        CancelledError: If the caller wants no more.
+    """
+    for name, share in (("support", min_support), ("held-out share", hold_out)):
+        if not (isinstance(share, Real) and 0.0 <= share < 1.0):
+            raise InputError(f"the {name} is {quoted(share)}; give 0 or more, and less than 1")
+    require(cluster, str, "the cluster must be text", "give its address, or local:2")
+    given = [paths] if isinstance(paths, (str, Path)) else list(paths)
+    description = None if env_id is None else describe_environment(env_id)
+    reading = Reading(stated(columns), description, missing, tuple(formulas))
+    plan = ClusterPlan(divider, min_support, max_depth, hold_out, seed)
+    files = parquet_paths(given)
+    with connected(cluster) as client:
+        return mine_on_cluster(client, files, reading, plan, pairs_of=pairs_of, progress=progress)
+
+
 def mine_on_cluster(
     client: Any,
     paths: Sequence[Path],
@@ -76,10 +147,7 @@ def mine_on_cluster(
     pairs_of: Callable[[Demonstrations], tuple[Pair, ...]] | None = None,
     progress: Progress | None = None,
 ) -> MinedData:
-    """Mine Parquet files that no single memory holds.
-
-    The same files, or the same rows cut into others, give the same trees, however many workers
-    there are.
+    """The same as `mine_files`, by a client of a cluster.
 
     Args:
         client: Of a cluster whose workers can open the files; a ``distributed.Client``.
