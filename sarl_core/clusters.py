@@ -29,7 +29,7 @@ class ClusterExecutor(Executor):
     """The processes of a cluster, as those of this machine."""
 
     def __init__(self, client: Any) -> None:
-        """Take its client, which somebody else closes.
+        """Take its client.
 
         Args:
             client: A ``distributed.Client``.
@@ -53,6 +53,10 @@ class ClusterExecutor(Executor):
         """See `Executor.submit`."""
         future: Future[Result] = self._executor.submit(call, *arguments, **named)
         return future
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Let go of the cluster, which goes on."""
+        self._client.close()
 
 
 @contextmanager

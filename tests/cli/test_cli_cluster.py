@@ -215,4 +215,5 @@ def test_jobs_of_a_dashboard_are_done_on_the_cluster_of_its_owner(monkeypatch):
             there = run_each(os.getpid, [()], executor=processes())
             assert there == list(owner.run(os.getpid).values())
         finally:
+            processes().shutdown()
             processes.clear()
