@@ -20,6 +20,7 @@ from sarl_dashboard.components.sidebar import (
 )
 from sarl_dashboard.session import settle
 from sarl_dashboard.state import data_words, in_force, library
+from sarl_dashboard.state.data import settle_choices
 from sarl_dashboard.state.url import (
     absurd_parameters,
     begin_run,
@@ -105,6 +106,7 @@ show_logo()
 left_out = st.empty()
 show_left_out(page.title, left_out)
 try:
+    settle_choices()
     data_words.take_up()
     in_force.take_up()
     take_up()

@@ -23,6 +23,7 @@ from streamlit.runtime.scriptrunner import get_script_run_ctx
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.formulas import Formula
+from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
@@ -45,6 +46,7 @@ _making: defaultdict[object, Lock] = defaultdict(Lock)
 HashFuncs = Mapping[type, Callable[[Any], object]]
 HASH_FUNCS: HashFuncs = {
     Demonstrations: attrgetter("digest"),
+    MinedData: attrgetter("digest"),
     PolicyTree: attrgetter("digest"),
     DataBox: tuple,
     RuleSet: attrgetter("digest"),

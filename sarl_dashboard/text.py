@@ -7,7 +7,9 @@ import re
 
 import streamlit as st
 
+from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.words.markdown import markdown_text
+from sarl_core.mining.language import counted
 
 escaped = markdown_text
 # What sentences say to those who type commands: the forms on the pages do the same.
@@ -48,6 +50,12 @@ def refuse(problem: Exception | str) -> None:
 def together(text: str) -> str:
     """A sentence in which no line ends between a number and its percent sign."""
     return re.sub(r"(?<=\d) (?=%)", "\N{NO-BREAK SPACE}", text)
+
+
+def size_text(demonstrations: Demonstrations) -> str:
+    """How many steps and episodes there are, wherever they are; as "900 steps in 3 episodes"."""
+    whole = demonstrations.whole
+    return f"{counted(whole.steps, 'step')} in {counted(whole.episodes, 'episode')}"
 
 
 def file_name(env_id: str) -> str:

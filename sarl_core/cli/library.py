@@ -343,9 +343,15 @@ def _add_rules(opened: Library, file: Path, name: str | None, about: Sequence[st
 def _add_demonstrations(
     opened: Library, file: Path, name: str | None, about: Sequence[str]
 ) -> Item:
+    from sarl_core.cli.inputs import is_mined_file
     from sarl_core.demonstrations.formats import load_demonstrations
-    from sarl_core.library.contents import add_demonstrations
+    from sarl_core.library.contents import add_demonstrations, add_mined
 
+    if is_mined_file(file):
+        from sarl_core.mining.distributed.mined_files import load_mined_data
+
+        mined = load_mined_data(file)
+        return add_mined(opened, mined, name or file.stem, author=_author(), came_from=about)
     demonstrations = load_demonstrations(file)
     return add_demonstrations(
         opened, demonstrations, name or file.stem, author=_author(), came_from=about

@@ -327,7 +327,7 @@ def _mine_at_a_distance(
             )
             tried = short = None
             if mined.held_out:
-                episodes = len(mined.held_out[0].numbers)
+                episodes = mined.held_out_episodes
                 if lower_bound:
                     short = holding_out.shortfall(rule_set.rules, lower_bound, episodes)
                     rule_set = holding_out.with_lower_bound(rule_set, lower_bound)

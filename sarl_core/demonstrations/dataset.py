@@ -26,6 +26,7 @@ from sarl_core.demonstrations.fields import (
     Actions,
     DemonstrationFields,
     Indicator,
+    Whole,
     labels_of,
 )
 from sarl_core.demonstrations.splits import Splits
@@ -283,6 +284,7 @@ class Demonstrations(DemonstrationFields):
         notes: Sentences on how the data was read (as "one episode, for want of a column").
         columns: What each column of the file was taken for; () where there was no table. It is
             no part of the digest.
+        sample_of: All steps, where these are some of them and the rest is elsewhere; else None.
 
     Raises:
         InputError: If anything above does not hold.
@@ -466,8 +468,15 @@ class Demonstrations(DemonstrationFields):
             if value is not None:
                 digest.update(f"{name}{value.dtype}{value.shape}".encode())
                 digest.update(np.ascontiguousarray(value).data)
+        if self.sample_of is not None:
+            metadata = metadata | {"sample_of": asdict(self.sample_of)}
         digest.update(json.dumps(metadata, sort_keys=True).encode())
         return digest.hexdigest()
+
+    @property
+    def whole(self) -> Whole:
+        """All steps: what these are a sample of, or these themselves."""
+        return self.sample_of or Whole(self.digest, len(self), self.n_episodes)
 
     def select(self, episodes: Sequence[int] | NDArray[np.int64]) -> Demonstrations:
         """Keep whole episodes.

@@ -77,6 +77,21 @@ class ColumnUse:
     why: str
 
 
+@dataclass(frozen=True)
+class Whole:
+    """The demonstrations that others are a sample of.
+
+    Attributes:
+        digest: Fingerprint of all steps.
+        steps: How many there are.
+        episodes: How many episodes.
+    """
+
+    digest: str
+    steps: int
+    episodes: int
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class DemonstrationFields:
     """N state-action pairs of an expert; `Demonstrations` says what each field is."""
@@ -106,3 +121,4 @@ class DemonstrationFields:
     seed: int | None = None
     notes: tuple[str, ...] = ()
     columns: tuple[ColumnUse, ...] = ()
+    sample_of: Whole | None = None

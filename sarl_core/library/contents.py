@@ -23,12 +23,21 @@ from sarl_core.library.library import Library
 from sarl_core.library.logs import log_content, log_file_name, log_roles, read_log
 from sarl_core.library.place import place_of
 from sarl_core.limits import limited_bytes
+from sarl_core.mining.distributed.mined_data import MinedData
+from sarl_core.mining.distributed.mined_files import (
+    ENDING,
+    is_mined_file,
+    load_mined_data,
+    read_mined_data,
+    save_mined_data,
+)
 from sarl_core.mining.editing.edit_files import edits_from_json, edits_to_json
 from sarl_core.mining.editing.edits import Edit
 from sarl_core.mining.rule_set import RuleSet, rules_digest, rules_from_json
 
 MAIN_FILES = {"demonstrations": ".parquet", "rules": ".json"}
 """Roles of the files that are demonstrations and rules, and their endings."""
+_ZIP = b"PK\x03\x04"  # how a mined file begins, which may stand in the place of a Parquet file
 
 
 def add_demonstrations(
@@ -71,6 +80,47 @@ def add_demonstrations(
             came_from=came_from,
             command=command,
             details=about,
+        )
+
+
+def add_mined(
+    library: Library,
+    mined: MinedData,
+    name: str,
+    *,
+    author: str,
+    came_from: Sequence[str] = (),
+) -> Item:
+    """Keep what is left of demonstrations that were mined elsewhere, in their place.
+
+    Args:
+        library: Where.
+        mined: All of it.
+        name: What they are called.
+        author: Whose they are.
+        came_from: Ids of what they were made of.
+
+    Raises:
+        InputError: As of `Library.add`.
+        WorkError: If it cannot be written.
+    """
+    whole = mined.sample.whole
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"demonstrations{ENDING}"
+        save_mined_data(mined, path)
+        return library.add(
+            "demonstrations",
+            name,
+            {"demonstrations": (path, ENDING)},
+            author=author,
+            digest=whole.digest,
+            came_from=came_from,
+            details={
+                "steps": whole.steps,
+                "episodes": whole.episodes,
+                "environment": mined.sample.env_id,
+                "mined": mined.digest,
+            },
         )
 
 
@@ -177,13 +227,24 @@ def edits_of(library: Library, item: Item, rule_set: RuleSet) -> tuple[Edit, ...
     return edits_from_json(limited_bytes(path), rule_set, name=f"what is kept as {item.id}")
 
 
-def demonstrations_of(library: Library, item: Item) -> Demonstrations:
-    """The demonstrations that are kept, as they were when they were added.
+def data_of(library: Library, item: Item) -> Demonstrations | MinedData:
+    """The demonstrations that are kept, or what is left of some, as they were when added.
 
     Raises:
         InputError: If it is something else, or its file is missing or damaged.
     """
-    return load_demonstrations(file_of(library, item, "demonstrations"))
+    path = file_of(library, item, "demonstrations")
+    return load_mined_data(path) if is_mined_file(path) else load_demonstrations(path)
+
+
+def demonstrations_of(library: Library, item: Item) -> Demonstrations:
+    """The demonstrations that are kept; of a mined file the sample.
+
+    Raises:
+        InputError: If it is something else, or its file is missing or damaged.
+    """
+    data = data_of(library, item)
+    return data.sample if isinstance(data, MinedData) else data
 
 
 def annotated_file(library: Library, item: Item, folder: Path) -> Path:
@@ -209,14 +270,18 @@ def annotated_file(library: Library, item: Item, folder: Path) -> Path:
         return folder / f"{item.id}.parquet"
     if item.kind != "demonstrations" or not is_annotated(item.details):
         return path
-    demonstrations = load_demonstrations(path)
+    data = data_of(library, item)
     try:
-        demonstrations = annotated(demonstrations, item.details)
+        demonstrations = annotated(demonstrations_of(library, item), item.details)
     except (InputError, KeyError, TypeError) as error:
         raise InputError(
             f"the names and formulas that were given to {quoted(item.name)} do not fit it "
             f"({error}); give them anew on the page Names, or use its file {path}"
         ) from error
+    if isinstance(data, MinedData):
+        path = folder / f"{item.id}{ENDING}"
+        save_mined_data(data.renamed(demonstrations), path)
+        return path
     path = folder / f"{item.id}.parquet"
     save_demonstrations(demonstrations, path)
     return path
@@ -315,9 +380,12 @@ def digest_of_files(kind: Kind, files: Mapping[str, bytes]) -> str | None:
         return None
     if kind not in files:
         raise InputError(f"it holds no {kind}; export it again")
+    content = files[kind]
     if kind == "rules":
-        return rules_digest(rules_from_json(files[kind], name="the rule file"))
-    return read_demonstrations(files[kind], f"demonstrations{MAIN_FILES[kind]}").digest
+        return rules_digest(rules_from_json(content, name="the rule file"))
+    if content.startswith(_ZIP):
+        return read_mined_data(content).sample.whole.digest
+    return read_demonstrations(content, f"demonstrations{MAIN_FILES[kind]}").digest
 
 
 def file_of(library: Library, item: Item, role: str | None = None) -> Path:

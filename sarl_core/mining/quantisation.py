@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from sarl_core.arrays import make_read_only
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
 
@@ -100,8 +101,10 @@ def quantise(
         For each action dimension one entry a divider.
 
     Raises:
-        InputError: If the actions are discrete, there is no divider, or one is out of range.
+        InputError: If the actions are discrete or a sample, there is no divider, or one is out of
+            range.
     """
+    require_every_step(demonstrations, "trying dividers")
     if demonstrations.is_discrete:
         raise InputError(
             "the demonstrated actions are discrete, and there is nothing to divide; give "

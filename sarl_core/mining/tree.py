@@ -51,17 +51,18 @@ class Source:
         """What is kept of demonstrations.
 
         Args:
-            demonstrations: N pairs.
+            demonstrations: N pairs, or a sample of them.
 
         Returns:
             Where trees and rules of them come from.
         """
+        whole = demonstrations.whole
         return cls(
             env_id=demonstrations.env_id,
             features=demonstrations.features,
-            digest=demonstrations.digest,
-            steps=len(demonstrations),
-            episodes=demonstrations.n_episodes,
+            digest=whole.digest,
+            steps=whole.steps,
+            episodes=whole.episodes,
         )
 
     def with_splits(self, splits: Sequence[Splits | None]) -> Source:

@@ -7,6 +7,8 @@ from collections.abc import Callable
 import streamlit as st
 from markupsafe import Markup
 
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.samples import needs_steps_text
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.mining.rules import Thresholds
@@ -34,6 +36,9 @@ def elsewhere_notice(
     demonstrations = chosen_demonstrations()
     if demonstrations is None or not rule_base.at_thresholds():
         return
+    if demonstrations.sample_of is not None:
+        _notice_of_file(demonstrations, cross_fitting.judged(thresholds), fidelity, more)
+        return
     divider = chosen_divider()
     key = cross_fitting.key_of(demonstrations, divider)
     waiting = key not in RESULTS
@@ -44,10 +49,7 @@ def elsewhere_notice(
         if elsewhere is not None:
             if waiting:
                 st.rerun()  # as a whole: the numbers above have it too, and nobody looks any more
-            warning = parting_text(fidelity, elsewhere)
-            if warning:
-                st.warning(warning, icon=":material/warning:")
-            st.html(note(judged_sentence(elsewhere)) + more(elsewhere))
+            _say(elsewhere, fidelity, more)
             return
         job = cross_fitting.job_of(key)
         if job is not None and job.error is not None:
@@ -72,3 +74,26 @@ def elsewhere_notice(
             )
 
     as_soon_as_it_is_there()
+
+
+def _notice_of_file(
+    sample: Demonstrations,
+    judged: Judged | None,
+    fidelity: float,
+    more: Callable[[Judged], Markup],
+) -> None:
+    """What a mined file knows of other episodes, of which it has the counts alone."""
+    if judged is not None:
+        _say(judged, fidelity, more)
+        return
+    st.caption(
+        "No episodes were held out when this file was mined, so what its rules are worth in others "
+        f"is not known. {in_full(needs_steps_text('finding it out', sample))}"
+    )
+
+
+def _say(judged: Judged, fidelity: float, more: Callable[[Judged], Markup]) -> None:
+    warning = parting_text(fidelity, judged)
+    if warning:
+        st.warning(warning, icon=":material/warning:")
+    st.html(note(judged_sentence(judged)) + more(judged))

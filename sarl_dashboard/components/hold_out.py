@@ -6,6 +6,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.language import counted
+from sarl_dashboard.state.data import mined_data
 from sarl_dashboard.state.hold_out import chosen, leave_out, parted
 from sarl_dashboard.text import in_full
 
@@ -19,6 +20,10 @@ def parting_lines(demonstrations: Demonstrations) -> list[str]:
     Returns:
         Lines; none where nothing is left out or held out.
     """
+    mined = mined_data()
+    if mined is not None:
+        episodes = mined.held_out_episodes
+        return [f"**{counted(episodes, 'episode')}** held out"] if episodes else []
     parts = parted(demonstrations)
     lines = []
     held = parts.held_out.n_episodes if parts.held_out is not None else 0

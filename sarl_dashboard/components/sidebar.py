@@ -31,7 +31,7 @@ from sarl_dashboard.state.thresholds import (
     chosen_thresholds,
 )
 from sarl_dashboard.state.url import say_in_url
-from sarl_dashboard.text import escaped, refuse
+from sarl_dashboard.text import escaped, refuse, size_text
 
 
 def threshold_parameters() -> dict[str, str | None]:
@@ -172,17 +172,16 @@ def sidebar(*, with_thresholds: bool = True) -> None:
         if demonstrations is None:
             st.caption("Nothing uploaded yet: see the Demonstrations page.")
             return
-        lines = [
-            f"{counted(len(demonstrations), 'step')} in "
-            f"{counted(demonstrations.n_episodes, 'episode')}"
-        ]
+        lines = [size_text(demonstrations)]
+        if len(demonstrations) < demonstrations.whole.steps:
+            lines[0] += f"; a sample of {len(demonstrations):,} of them is here"
         whole = all_demonstrations()
         lines += parting_lines(whole) if whole is not None else []
         formulas = sum(isinstance(one.definition, Formula) for one in demonstrations.derived)
         if formulas:
             lines.append(f"**{counted(formulas, 'formula')}** among the features")
         # On pages that do not ask for it the choice keeps its place in the URL by this.
-        if combining.chosen().on:
+        if combining.chosen().on and demonstrations.sample_of is None:
             lines.append("**Combinations** of two features on")
         st.caption("  \n".join(lines))
         _rules_choice()

@@ -10,6 +10,7 @@ from __future__ import annotations
 from concurrent.futures import Executor
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
@@ -19,7 +20,7 @@ from sarl_dashboard.cache import RESULTS, cached, keep, owner
 from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.mining import mining
 from sarl_dashboard.state import combining, rule_base
-from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_dashboard.state.data import chosen_demonstrations, mined_data
 from sarl_dashboard.state.mined import learner_of
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider
 
@@ -42,8 +43,12 @@ def judged(thresholds: Thresholds) -> Judged | None:
         thresholds: Of the chosen demonstrations.
 
     Returns:
-        Of mined rules alone: a compact set was built from other states.
+        Of mined rules alone: a compact set was built from other states. Of a mined file what the
+        episodes say that were held out when it was mined.
     """
+    mined = mined_data()
+    if mined is not None:
+        return _judged_in_file(mined, thresholds) if rule_base.at_thresholds() else None
     fit = known()
     return None if fit is None else _judged(fit, thresholds)
 
@@ -51,7 +56,9 @@ def judged(thresholds: Thresholds) -> Judged | None:
 def known() -> CrossFit | None:
     """The trees without each fold of the chosen demonstrations; None while they are not there."""
     demonstrations = chosen_demonstrations()
-    if demonstrations is None or not rule_base.at_thresholds():
+    if demonstrations is None or demonstrations.sample_of is not None:
+        return None
+    if not rule_base.at_thresholds():
         return None
     fit = RESULTS.get(key_of(demonstrations, chosen_divider()))
     return fit if isinstance(fit, CrossFit) else None
@@ -60,6 +67,11 @@ def known() -> CrossFit | None:
 def _trees_of(fit: CrossFit) -> tuple[str, ...]:
     """What tells one from others: the trees know the episodes that they were grown from."""
     return tuple(tree.digest for fold in fit.folds for tree in fold.trees)
+
+
+@cached()
+def _judged_in_file(mined: MinedData, thresholds: Thresholds) -> Judged | None:
+    return mined.judged(thresholds)
 
 
 @cached(hash_funcs={CrossFit: _trees_of})
@@ -107,7 +119,9 @@ def begin(demonstrations: Demonstrations, divider: int) -> None:
 def make_ready() -> None:
     """Begin to make it, where it is not there and not on its way: once the page is drawn."""
     demonstrations = chosen_demonstrations()
-    if demonstrations is None or not rule_base.at_thresholds() or len(demonstrations) > UNASKED:
+    if demonstrations is None or not rule_base.at_thresholds():
+        return
+    if len(demonstrations) > UNASKED or demonstrations.sample_of is not None:
         return
     divider = chosen_divider()
     key = key_of(demonstrations, divider)

@@ -21,7 +21,7 @@ _MOST = 0.95  # of a bar that only knows how long such work usually takes
 
 def is_long(demonstrations: Demonstrations) -> bool:
     """Whether growing the trees of demonstrations takes more than a moment."""
-    return len(demonstrations) > EXACT_UP_TO
+    return demonstrations.sample_of is None and len(demonstrations) > EXACT_UP_TO
 
 
 def key_of(demonstrations: Demonstrations, divider: int) -> tuple[object, ...]:

@@ -92,7 +92,7 @@ def combined(parts: Parts) -> Parts:
         The same object where they are off, or where there are none.
     """
     choice = chosen()
-    if not choice.on:
+    if not choice.on or parts.mined.sample_of is not None:
         return parts
     derived = _derived(parts.mined, choice.features)
     return parts if derived.problem else _deriving(parts, derived.derived)

@@ -14,12 +14,13 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError, quoted
+from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached, visit
 from sarl_dashboard.session import end_page
 from sarl_dashboard.state import combining, formulas, given_names, hold_out, library
 from sarl_dashboard.state.hold_out import Parts
-from sarl_dashboard.state.thresholds import THRESHOLDS
+from sarl_dashboard.state.thresholds import THRESHOLDS, Settled, settle
 from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import refuse
 
@@ -110,25 +111,25 @@ def choose_dataset(name: str) -> None:
     set_url_choice("data", name, DEFAULT_DATA)
 
 
-def set_upload(demonstrations: Demonstrations, *, file_name: str = "") -> None:
-    """Keep uploaded demonstrations for this session, and choose them.
+def set_upload(upload: Demonstrations | MinedData, *, file_name: str = "") -> None:
+    """Keep uploaded demonstrations, or what is left of some, for this session, and choose them.
 
     Args:
-        demonstrations: Read and checked.
+        upload: Read and checked.
         file_name: Shown where the data is named.
     """
-    visit().bring(demonstrations.digest)
-    st.session_state["_upload"] = demonstrations
+    visit().bring(upload.digest)
+    st.session_state["_upload"] = upload
     st.session_state["_upload_name"] = file_name
     st.session_state["_upload_id"] = ""
     try:
-        identifier = library.keep(demonstrations, file_name or "demonstrations")
+        identifier = library.keep(upload, file_name or "demonstrations")
     except SarlError as error:
         library.say_once(error)
         choose_dataset(UPLOAD)
         return
     st.session_state["_upload_id"] = identifier
-    _with_notes(demonstrations)
+    _with_notes(steps_of(upload))
     choose_dataset(identifier)
 
 
@@ -146,29 +147,69 @@ def is_upload_chosen() -> bool:
 
 
 def uploaded_demonstrations() -> Demonstrations | None:
-    """The demonstrations uploaded in this session, if any."""
-    return cast("Demonstrations | None", st.session_state.get("_upload"))
+    """The demonstrations uploaded in this session, if any; no sample of a mined file."""
+    upload = st.session_state.get("_upload")
+    return upload if isinstance(upload, Demonstrations) else None
 
 
-def raw_demonstrations() -> Demonstrations | None:
-    """The chosen demonstrations as they were read; None while nothing is uploaded.
+def _opened() -> Demonstrations | MinedData | None:
+    """What is chosen as it was read; None while nothing is uploaded.
 
     What cannot be read is said on the page, which then stops.
     """
     name = chosen_dataset()
     if is_upload_chosen():
-        return uploaded_demonstrations()
+        return cast("Demonstrations | MinedData | None", st.session_state.get("_upload"))
     try:
         if name not in SHIPPED_SETS:
-            return _with_notes(library.stored_demonstrations(name))
+            stored = library.stored_demonstrations(name)
+            _with_notes(steps_of(stored))
+            return stored
         return shipped_demonstrations(name)
     except SarlError as error:
         refuse(error)
         end_page()
 
 
-def _with_notes(raw: Demonstrations) -> Demonstrations:
-    """Kept demonstrations, in the first run of a visit with the names and formulas they had."""
+def raw_demonstrations() -> Demonstrations | None:
+    """The chosen demonstrations as they were read; None while nothing is uploaded.
+
+    Of a mined file they are a sample, and say so. What cannot be read is said on the page, which
+    then stops.
+    """
+    opened = _opened()
+    return None if opened is None else steps_of(opened)
+
+
+def mined_data() -> MinedData | None:
+    """What is left of demonstrations that were mined elsewhere, under the names given to them.
+
+    None where the steps themselves are chosen: their trees are grown here.
+    """
+    opened = _opened()
+    if not isinstance(opened, MinedData):
+        return None
+    return _under_names(opened, given_names.named(opened.sample))
+
+
+@cached()
+def _under_names(mined: MinedData, sample: Demonstrations) -> MinedData:
+    return mined.renamed(sample)
+
+
+def steps_of(opened: Demonstrations | MinedData) -> Demonstrations:
+    """Demonstrations; of a mined file the sample."""
+    return opened.sample if isinstance(opened, MinedData) else opened
+
+
+def settle_choices() -> None:
+    """Leave to a mined file what was settled when it was mined; before anything is chosen."""
+    opened = None if data_problem() else _opened()
+    settle(Settled(opened.divider, opened.min_support) if isinstance(opened, MinedData) else None)
+
+
+def _with_notes(raw: Demonstrations) -> None:
+    """Give kept demonstrations, in the first run of a visit, the names and formulas they had."""
     ready = st.session_state.setdefault("_restored", set())
     if raw.digest not in ready:
         ready.add(raw.digest)
@@ -177,7 +218,6 @@ def _with_notes(raw: Demonstrations) -> Demonstrations:
         with suppress(SarlError, KeyError, TypeError):
             formulas.restore(raw, details)
             given_names.restore(raw, details)
-    return raw
 
 
 # The way of the data: as it was read (`raw_demonstrations`), with a visitor's `formulas` and under

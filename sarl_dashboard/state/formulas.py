@@ -26,7 +26,12 @@ def _written() -> dict[str, Derived]:
 
 
 def derived_of(raw: Demonstrations) -> Derived:
-    """What is derived of the features: what the file derives, until a visitor changes it."""
+    """What is derived of the features: what the file derives, until a visitor changes it.
+
+    Of a sample it is what the trees know, and nobody changes that.
+    """
+    if raw.sample_of is not None:
+        return raw.derived
     return _written().get(raw.digest, raw.derived)
 
 

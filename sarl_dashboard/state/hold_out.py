@@ -97,7 +97,8 @@ def parted(demonstrations: Demonstrations) -> Parts:
         The same object where nothing is left out or held out.
     """
     choice = chosen()
-    if not choice.share and not choice.left_out:
+    settled = demonstrations.sample_of is not None  # of a mined file, when it was mined
+    if settled or not (choice.share or choice.left_out):
         return Parts(demonstrations, demonstrations)
     return _parted(demonstrations, choice)
 

@@ -19,8 +19,9 @@ from sarl_core.library import Item, Library
 from sarl_core.library.contents import (
     add_demonstrations,
     add_edits,
+    add_mined,
     add_rules,
-    demonstrations_of,
+    data_of,
     edits_of,
     rules_of,
 )
@@ -30,6 +31,7 @@ from sarl_core.library.logs import add_log
 from sarl_core.library.place import LibraryPlace, place_of, usual_author
 from sarl_core.library.results import add_result
 from sarl_core.limits import limited_bytes
+from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.editing.edits import Edit
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.rollouts.episode_files import episodes_from_json, episodes_to_json
@@ -100,22 +102,27 @@ def standing_item(identifier: str) -> Item:
     return item
 
 
-def stored_demonstrations(identifier: str) -> Demonstrations:
-    """Demonstrations that are kept.
+def stored_demonstrations(identifier: str) -> Demonstrations | MinedData:
+    """Demonstrations that are kept, or what is left of some.
 
     Raises:
         SarlError: If there are none, they were removed, or cannot be read.
     """
     item = standing_item(identifier)
-    demonstrations = _read(item.id, item.digest)
-    _ids()[demonstrations.digest] = item.id
-    return demonstrations
+    stored = _read(item.id, item.digest)
+    _ids()[_steps_digest(stored)] = item.id
+    return stored
 
 
 @cached(show_spinner="Reading the demonstrations …")
-def _read(identifier: str, digest: str) -> Demonstrations:
+def _read(identifier: str, digest: str) -> Demonstrations | MinedData:
     opened = library()
-    return demonstrations_of(opened, opened.item(identifier))
+    return data_of(opened, opened.item(identifier))
+
+
+def _steps_digest(data: Demonstrations | MinedData) -> str:
+    """By what pages know them: they work on the steps that are here."""
+    return data.sample.digest if isinstance(data, MinedData) else data.digest
 
 
 def stored_rules(item: Item) -> RuleSet:
@@ -146,11 +153,11 @@ def stored_edits(item: Item, rule_set: RuleSet) -> tuple[Edit, ...]:
     return edits_of(library(), item, rule_set)
 
 
-def keep(demonstrations: Demonstrations, name: str) -> str:
+def keep(data: Demonstrations | MinedData, name: str) -> str:
     """Keep what was uploaded.
 
     Args:
-        demonstrations: Read and checked.
+        data: Read and checked.
         name: Of the file.
 
     Returns:
@@ -160,12 +167,20 @@ def keep(demonstrations: Demonstrations, name: str) -> str:
         SarlError: If it cannot be kept.
     """
     opened = library()
-    digest = demonstrations.digest
+    steps = data.sample if isinstance(data, MinedData) else data
+    mined = data.digest if isinstance(data, MinedData) else ""
     known = [
-        one for one in opened.with_digest(digest, kind="demonstrations") if one.author == author()
+        one
+        for one in opened.with_digest(steps.whole.digest, kind="demonstrations")
+        if (one.author, one.details.get("mined", "")) == (author(), mined)
     ]
-    item = known[0] if known else add_demonstrations(opened, demonstrations, name, author=author())
-    _ids()[digest] = item.id
+    if known:
+        item = known[0]
+    elif isinstance(data, MinedData):
+        item = add_mined(opened, data, name, author=author())
+    else:
+        item = add_demonstrations(opened, data, name, author=author())
+    _ids()[_steps_digest(data)] = item.id
     _say_room(opened)
     return item.id
 

@@ -8,6 +8,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.explaining.tables.rules import TopRules, top_rules
 from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.editing.renaming import renamed_trees
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.evidence import EpisodeCounts
@@ -19,7 +20,12 @@ from sarl_core.mining.thresholds.pareto import ParetoPoint, pareto_front
 from sarl_core.mining.tree import Learner, PolicyTree
 from sarl_core.mining.validation.holding_out import count_held_out, with_held_out
 from sarl_dashboard.cache import cached
-from sarl_dashboard.state.data import chosen_demonstrations, data_parts
+from sarl_dashboard.state.data import (
+    chosen_demonstrations,
+    data_parts,
+    held_out_demonstrations,
+    mined_data,
+)
 from sarl_dashboard.state.hold_out import Parts
 from sarl_dashboard.state.thresholds import (
     MIN_DIVIDER,
@@ -45,6 +51,8 @@ def grown_trees(
 ) -> Trees:
     """The trees of demonstrations, one an action dimension; other names grow no others.
 
+    Of a mined file they are those that it holds.
+
     Args:
         demonstrations: N pairs.
         divider: Number of intervals of continuous actions; without meaning for discrete ones.
@@ -53,6 +61,9 @@ def grown_trees(
     Returns:
         Shared between sessions (they are immutable).
     """
+    mined = mined_data()
+    if mined is not None and demonstrations.sample_of is not None:
+        return mined.trees
     return _grown(*growing_of(demonstrations, divider, learner))
 
 
@@ -71,11 +82,13 @@ def _grown(demonstrations: Demonstrations, divider: int, learner: Learner) -> Tr
 
 
 def learner_of(demonstrations: Demonstrations) -> Learner:
-    """What grows the trees of demonstrations, as it is chosen."""
+    """What grows the trees of demonstrations, as it is chosen, or did so where they were mined."""
+    mined = mined_data()
+    if mined is not None:
+        return mined.trees[0].learner
     return learner_for(chosen_learner(), len(demonstrations))
 
 
-@cached()
 def mined_rules(trees: Trees, thresholds: Thresholds, parts: Parts | None) -> RuleSet:
     """The rule set of trees at thresholds.
 
@@ -86,7 +99,28 @@ def mined_rules(trees: Trees, thresholds: Thresholds, parts: Parts | None) -> Ru
 
     Returns:
         Rules of these data carry their data boxes and what the held-out episodes say of them.
+
+    Raises:
+        InputError: If the trees of a mined file do not reach down to the support.
     """
+    mined = mined_data()
+    if mined is not None and mined.trees == trees:
+        return _rules_of_file(mined, thresholds)
+    return _mined_rules(trees, thresholds, parts)
+
+
+@cached()
+def _rules_of_file(mined: MinedData, thresholds: Thresholds) -> RuleSet:
+    return mined.mine(
+        supp_min=thresholds.support,
+        conf_min=thresholds.confidence,
+        lift_min=thresholds.lift,
+        max_depth=thresholds.max_depth,
+    )
+
+
+@cached()
+def _mined_rules(trees: Trees, thresholds: Thresholds, parts: Parts | None) -> RuleSet:
     rule_set = mine_rules(
         trees,
         supp_min=thresholds.support,
@@ -94,7 +128,7 @@ def mined_rules(trees: Trees, thresholds: Thresholds, parts: Parts | None) -> Ru
         lift_min=thresholds.lift,
         max_depth=thresholds.max_depth,
     )
-    if parts is None or parts.mined.digest != rule_set.source.digest:
+    if parts is None or parts.mined.whole.digest != rule_set.source.digest:
         return rule_set
     boxed = with_boxes(rule_set, parts.mined)
     return boxed if parts.held_out is None else with_held_out(boxed, parts.held_out)
@@ -119,6 +153,14 @@ def rules_at(thresholds: Thresholds | None = None) -> RuleSet:
     return mined_rules(trees, thresholds or chosen_thresholds(), data_parts())
 
 
+def tried_on() -> Demonstrations | MinedData | None:
+    """What rules are tried on: the episodes held out, or the file that counted them; else None."""
+    mined = mined_data()
+    if mined is None:
+        return held_out_demonstrations()
+    return mined if mined.held_out else None
+
+
 @cached()
 def _held_out_counts(trees: Trees, held_out: Demonstrations) -> tuple[EpisodeCounts, ...]:
     return count_held_out(trees, held_out)
@@ -132,14 +174,17 @@ def mined_landscape(
     *,
     lift: float,
     depth: int | None,
-    held_out: Demonstrations | None,
+    held_out: Demonstrations | MinedData | None,
 ) -> Landscape:
     """The landscape over a grid.
 
     Returns:
         With a layer of what the held-out episodes say, where there are some.
     """
-    counts = None if held_out is None else _held_out_counts(trees, held_out)
+    if isinstance(held_out, MinedData):
+        counts: tuple[EpisodeCounts, ...] | None = held_out.held_out
+    else:
+        counts = None if held_out is None else _held_out_counts(trees, held_out)
     return threshold_landscape(
         trees, supports, confidences, lift_min=lift, max_depth=depth, held_out=counts
     )

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple, cast
 
 import streamlit as st
 
@@ -17,6 +18,40 @@ MIN_DIVIDER, MAX_DIVIDER = 2, 16
 LEARNERS: tuple[LearnerChoice, ...] = ("auto", "exact", "histogram")
 MAX_LIFT = 20.0
 MAX_DEPTH = 64  # 0 is no limit
+
+
+class Settled(NamedTuple):
+    """What cannot be chosen of trees that are not grown here.
+
+    Attributes:
+        divider: At which they were grown.
+        least_support: Down to which.
+    """
+
+    divider: int
+    least_support: float
+
+
+def settle(settled: Settled | None) -> None:
+    """Say what is settled, before anything is chosen in a run; None for nothing."""
+    st.session_state["_settled"] = settled
+
+
+def settled() -> Settled | None:
+    """What cannot be chosen; None where all can."""
+    return cast("Settled | None", st.session_state.get("_settled"))
+
+
+def least_support() -> float:
+    """The least minimum support that there are rules for."""
+    known = settled()
+    return 0.0 if known is None else known.least_support
+
+
+def from_least(supports: Sequence[float]) -> tuple[float, ...]:
+    """Supports, ascending, without those that there are no rules for."""
+    least = least_support()
+    return tuple(dict.fromkeys(max(support, least) for support in supports))
 
 
 def _number(name: str, default: float, low: float, high: float) -> float:
@@ -44,7 +79,7 @@ def chosen_limits() -> tuple[float, int | None]:
 def chosen_thresholds() -> Thresholds:
     """The thresholds in force (URL: support, confidence, and those of `chosen_limits`)."""
     return Thresholds(
-        _number("support", FILTERED.support, 0.0, 1.0),
+        max(_number("support", FILTERED.support, 0.0, 1.0), least_support()),
         _number("confidence", FILTERED.confidence, 0.0, 1.0),
         *chosen_limits(),
     )
@@ -64,6 +99,8 @@ def choose_thresholds(thresholds: Thresholds) -> None:
 
 def chosen_divider() -> int:
     """Number of intervals of continuous actions (URL: divider)."""
+    if (known := settled()) is not None:
+        return known.divider
     return int(_number("divider", MIN_DIVIDER, MIN_DIVIDER, MAX_DIVIDER))
 
 

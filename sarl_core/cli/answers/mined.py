@@ -51,7 +51,7 @@ def describe_mined(mined: MinedData, path: Path) -> dict[str, Any]:
         "divider": mined.divider,
         "learner": mined.trees[0].learner,
         "min_support": mined.min_support,
-        "held_out_episodes": len(mined.held_out[0].numbers) if mined.held_out else 0,
+        "held_out_episodes": mined.held_out_episodes,
         "notes": list(mined.sample.notes),
         "digest": source.digest,
     }

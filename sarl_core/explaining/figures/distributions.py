@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
+from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.labels import LabelledDimension
 
 _FEW_VALUES = 12
@@ -101,6 +102,24 @@ def feature_rows(demonstrations: Demonstrations) -> tuple[FeatureRow, ...]:
     return tuple(map(feature_row, demonstrations.features, demonstrations.observations.T))
 
 
+def counted_feature_rows(mined: MinedData) -> tuple[FeatureRow, ...]:
+    """Every feature in numbers, of all pairs though only a sample is here.
+
+    Args:
+        mined: Over N pairs.
+
+    Returns:
+        d rows; the median is the nearest border between bins.
+    """
+    box = mined.boxes[0][:, 0]  # of the root
+    return tuple(
+        FeatureRow(feature.name, feature.unit, float(low), histogram.quantile(0.5), float(high))
+        for feature, histogram, low, high in zip(
+            mined.sample.features, mined.histograms, box[0], box[3], strict=True
+        )
+    )
+
+
 def feature_row(feature: Feature, values: NDArray[np.float32]) -> FeatureRow:
     """One feature in numbers.
 
@@ -157,6 +176,22 @@ def histogram_by_label(
     scaled = (values.astype(np.float64) - low) * (bins / (high - low))
     index = np.minimum(scaled.astype(np.int64), bins - 1)
     return Histogram(edges, _count(index, labels, n_labels, bins))
+
+
+def label_histogram(counts: NDArray[np.int64], dimension: LabelledDimension) -> Histogram:
+    """Counted labels of an action dimension, one bin a label.
+
+    Args:
+        counts: Pairs of each label, (k,).
+        dimension: With k labels.
+
+    Returns:
+        The counts between the edges of intervals; of names at 0 to k - 1.
+    """
+    edges = np.array(dimension.edges or np.arange(len(counts) + 1) - 0.5, dtype=np.float64)
+    if edges[0] == edges[-1]:  # a single value, with some room beside it
+        edges = edges[0] + np.array([-0.5, 0.5])
+    return Histogram(edges, np.diag(counts))
 
 
 def interval_histogram(values: NDArray[Any], dimension: LabelledDimension) -> Histogram:

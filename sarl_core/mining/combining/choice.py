@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import Combination, DerivedFeature
+from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError, require
 from sarl_core.mining.combining.candidates import (
     Pair,
@@ -50,10 +51,11 @@ def with_combinations(
         The same steps with the combinations behind their features; the same every time.
 
     Raises:
-        InputError: If there is nothing to combine, or a pair is none.
+        InputError: If there is nothing to combine, a pair is none, or the steps are a sample.
     """
     must = "what features are combined of must be Demonstrations"
     require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
+    require_every_step(demonstrations, "choosing combinations")
     d = len(demonstrations.observed)
     known = {one.definition for one in demonstrations.derived}
     chosen = (

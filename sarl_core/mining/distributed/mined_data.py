@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -12,10 +13,12 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.editing.renaming import renamed_trees
 from sarl_core.mining.evidence import DataBox, EpisodeCounts, HeldOut
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.rules import Rule
+from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.validation.cross_fitting import Fold, Judged
 
 Floats = NDArray[np.float64]
 
@@ -100,6 +103,33 @@ class MinedData:
         return self.trees[0].divider
 
     @cached_property
+    def digest(self) -> str:
+        """Fingerprint (blake2b, 32 hex digits) of the trees, the sample and what was counted."""
+        digest = hashlib.blake2b(digest_size=16)
+        for part in (*(tree.digest for tree in self.trees), self.sample.digest, self.min_support):
+            digest.update(f"{part} ".encode())
+        for counts in self.held_out:
+            for column in (counts.subject, counts.episode, counts.samples, counts.correct):
+                digest.update(np.ascontiguousarray(column).data)
+        return digest.hexdigest()
+
+    @property
+    def held_out_episodes(self) -> int:
+        """Number of episodes that were held out."""
+        return len(self.held_out[0].numbers) if self.held_out else 0
+
+    def renamed(self, sample: Demonstrations) -> MinedData:
+        """The same under the names of its sample.
+
+        Args:
+            sample: That of these data, under whatever names.
+
+        Returns:
+            With trees that say these names.
+        """
+        return replace(self, trees=renamed_trees(self.trees, sample), sample=sample)
+
+    @cached_property
     def _of_nodes(self) -> tuple[list[HeldOut], ...]:
         return tuple(counts.held_out() for counts in self.held_out)
 
@@ -166,6 +196,14 @@ class MinedData:
         return EpisodeCounts(
             len(rule_set.rules), place, episode, samples, correct, first.numbers, first.lengths
         )
+
+    def judged(self, thresholds: Thresholds) -> Judged | None:
+        """What the held-out episodes say of all rules at thresholds; None where there are none.
+
+        Args:
+            thresholds: At which the trees are cut.
+        """
+        return Fold(self.trees, self.held_out).at(thresholds) if self.held_out else None
 
     def _completed(self, rule: Rule) -> Rule:
         node = node_of(rule)

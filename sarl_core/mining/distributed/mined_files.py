@@ -10,6 +10,7 @@ import io
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from sarl_core.archives import array_of, arrays_in, entry_content, opened, promise_of
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.fields import Whole
 from sarl_core.demonstrations.formats.arrow.parquet_file import write_parquet
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.demonstrations.formats.registry import read_demonstrations
@@ -216,7 +218,9 @@ def _data(
     document: _MinedDocument, sample: Demonstrations, arrays: Mapping[str, NDArray[Any]]
 ) -> MinedData:
     features = sample.features
-    source = Source(sample.env_id, features, document.digest, document.steps, document.episodes)
+    whole = Whole(document.digest, document.steps, document.episodes)
+    sample = replace(sample, sample_of=whole, columns=())
+    source = Source.of(sample)
     dimensions = label_dimensions(sample, document.divider)
     _require(document.trees == len(dimensions))
     trees, boxes, held_out = [], [], []

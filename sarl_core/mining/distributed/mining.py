@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from sarl_core.clusters import cluster as connected
 from sarl_core.clusters import saying_losses
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.fields import Whole
 from sarl_core.demonstrations.formats.columns import Columns, stated
 from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.environments.description import describe_environment
@@ -296,13 +297,13 @@ def _mined(
     in_bins: NDArray[np.int64],
     plan: ClusterPlan,
 ) -> MinedData:
-    sample = _some(mined)
     steps = int(counted[0].counts.sum())
     episodes = len(layout.episodes) - len(held_out)
     digest = layout.digest
     if len(held_out):
         digest = hashlib.blake2b(digest.encode() + held_out.tobytes(), digest_size=16).hexdigest()
-    source = Source(mined.env_id, mined.features, digest, steps, episodes)
+    sample = replace(_some(mined), sample_of=Whole(digest, steps, episodes))
+    source = Source.of(sample)
     trees: list[PolicyTree] = []
     boxes = []
     for index, (structure, counts) in enumerate(zip(structures, counted, strict=True)):

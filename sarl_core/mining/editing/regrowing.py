@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError, quoted
 from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.editing.edits import Edit, Regrow
@@ -239,6 +240,7 @@ def way_to(tree: PolicyTree, place: int, thresholds: Thresholds) -> Way:
 
 
 def _place_of(tree: PolicyTree, node: int, demonstrations: Demonstrations) -> int:
+    require_every_step(demonstrations, "regrowing a part of the tree")
     if tree.source.digest != demonstrations.digest:
         raise InputError(
             f"the tree of {tree.dimension.name!r} was grown from other demonstrations; give those "

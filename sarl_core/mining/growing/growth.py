@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError, quoted, require
 from sarl_core.mining.growing.exact import exact_structure
 from sarl_core.mining.growing.histogram import BinnedStates, histogram_structure
@@ -77,10 +78,12 @@ def grow_policy_trees(
         One tree an action dimension.
 
     Raises:
-        InputError: If the divider, the depth, the learner or the support is none.
+        InputError: If the divider, the depth, the learner or the support is none, or the pairs are
+            a sample.
     """
     must = "what trees are grown from must be Demonstrations"
     require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
+    require_every_step(demonstrations, "growing trees")
     if max_depth is not None and not (isinstance(max_depth, Integral) and max_depth >= 1):
         raise InputError(f"the maximum depth is {quoted(max_depth)}; give 1 or more, or none")
     if not (isinstance(min_support, Real) and 0.0 <= min_support <= 1.0):

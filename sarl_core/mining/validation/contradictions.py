@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError
 from sarl_core.mining.labels import label_dimensions
 
@@ -113,8 +114,9 @@ def find_contradictions(
         Where they disagree.
 
     Raises:
-        InputError: If the divider or the reach is out of range.
+        InputError: If the divider or the reach is out of range, or the pairs are a sample.
     """
+    require_every_step(demonstrations, "looking for contradictions")
     if not (np.isfinite(reach) and reach >= 0.0):
         raise InputError(f"the distance is {reach}; give 0 or more standard deviations")
     labels = _labels(demonstrations, divider)

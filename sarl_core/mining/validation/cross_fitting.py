@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError
 from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.combining.candidates import Pair
@@ -54,6 +55,33 @@ class Fold:
     trees: tuple[PolicyTree, ...]
     counts: tuple[EpisodeCounts, ...]
 
+    def at(self, thresholds: Thresholds) -> Judged:
+        """What those episodes say of the rules at some thresholds.
+
+        Args:
+            thresholds: At which the trees are cut.
+
+        Returns:
+            The same as `judge` of these rules.
+        """
+        first = self.counts[0]
+        samples, correct = np.zeros((2, len(first.numbers)), dtype=np.int64)
+        for tree, counts in zip(self.trees, self.counts, strict=True):
+            chosen = np.zeros(tree.n_nodes, dtype=np.bool_)
+            chosen[
+                cut_nodes(
+                    tree,
+                    supp_min=thresholds.support,
+                    conf_min=thresholds.confidence,
+                    lift_min=thresholds.lift,
+                    max_depth=thresholds.max_depth,
+                )
+            ] = True
+            some, right = counts.together(chosen)
+            samples, correct = samples + some, correct + right
+        decisions = first.lengths * len(self.trees)
+        return Judged(first.numbers, first.lengths, decisions, samples, correct)
+
 
 @dataclass(frozen=True, eq=False)
 class CrossFit:
@@ -77,31 +105,13 @@ class CrossFit:
         Returns:
             The same as mining at them once for each fold gives.
         """
-        counted: list[tuple[Integers, ...]] = []
-        for fold in self.folds:
-            first = fold.counts[0]
-            samples, correct = np.zeros((2, len(first.numbers)), dtype=np.int64)
-            for tree, counts in zip(fold.trees, fold.counts, strict=True):
-                chosen = np.zeros(tree.n_nodes, dtype=np.bool_)
-                chosen[
-                    cut_nodes(
-                        tree,
-                        supp_min=thresholds.support,
-                        conf_min=thresholds.confidence,
-                        lift_min=thresholds.lift,
-                        max_depth=thresholds.max_depth,
-                    )
-                ] = True
-                some, right = counts.together(chosen)
-                samples, correct = samples + some, correct + right
-            counted.append((first.numbers, first.lengths, samples, correct))
-        numbers, lengths, samples, correct = map(np.concatenate, zip(*counted, strict=True))
+        judged = [fold.at(thresholds) for fold in self.folds]
         return Judged(
-            numbers=numbers,
-            lengths=lengths,
-            decisions=lengths * len(self.folds[0].trees),
-            covered=samples,
-            correct=correct,
+            numbers=np.concatenate([one.numbers for one in judged]),
+            lengths=np.concatenate([one.lengths for one in judged]),
+            decisions=np.concatenate([one.decisions for one in judged]),
+            covered=np.concatenate([one.covered for one in judged]),
+            correct=np.concatenate([one.correct for one in judged]),
             folds=len(self.folds),
             whole_episodes=self.whole_episodes,
         )
@@ -212,6 +222,7 @@ def cross_fit(
         InputError: If there are fewer than two folds, or too few steps for two.
         CancelledError: If the caller wants no more.
     """
+    require_every_step(demonstrations, "judging rules in other episodes")
     if folds is None:
         folds = FOLDS if len(demonstrations) < MANY_STEPS else FEWER_FOLDS
     if folds < 2:

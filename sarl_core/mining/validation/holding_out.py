@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.recoding import recoded
+from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError
 from sarl_core.mining.evidence import FEWEST_EPISODES, EpisodeCounts, HeldOut, held_out_of, t_reach
 from sarl_core.mining.rule_order import rules_for
@@ -54,8 +55,10 @@ def hold_out(demonstrations: Demonstrations, share: float, *, seed: int = 0) -> 
         Both parts, each in its present order.
 
     Raises:
-        InputError: If the share, or the number of episodes, leaves none for one of the parts.
+        InputError: If the share, or the number of episodes, leaves none for one of the parts, or
+            the pairs are a sample.
     """
+    require_every_step(demonstrations, "holding out other episodes")
     if not 0.0 < share < 1.0:
         raise InputError(
             f"the held-out share is {share:g}; give one above 0 and below 1, so that there are "

@@ -11,10 +11,13 @@ from sarl_core.explaining.figures.distributions import (
     episode_series,
     histogram_by_label,
     interval_histogram,
+    label_histogram,
 )
+from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.labels import label_dimensions
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.text import escaped
 
 MOST_FIGURES = 12
@@ -37,6 +40,15 @@ def action_figures(demonstrations: Demonstrations, divider: int) -> tuple[go.Fig
 
 
 @cached()
+def counted_action_figures(mined: MinedData) -> tuple[go.Figure, ...]:
+    """The same of what was counted of all steps."""
+    return tuple(
+        action_figure(label_histogram(tree.counts[0], tree.dimension), tree.dimension)
+        for tree in mined.trees
+    )
+
+
+@cached()
 def episode_figures(
     demonstrations: Demonstrations,
 ) -> tuple[go.Figure | None, go.Figure]:
@@ -52,10 +64,12 @@ def episode_figures(
     )
 
 
-def show_actions(demonstrations: Demonstrations, divider: int) -> None:
-    """How often each action was taken; return and length of every episode."""
-    returns, lengths = episode_figures(demonstrations)
-    figures = action_figures(demonstrations, divider)
+def show_actions(
+    demonstrations: Demonstrations, divider: int, mined: MinedData | None = None
+) -> None:
+    """How often each action was taken; return and length of every episode, where they are here."""
+    returns, lengths = (None, None) if mined else episode_figures(demonstrations)
+    figures = counted_action_figures(mined) if mined else action_figures(demonstrations, divider)
     dimensions = demonstrations.action_dimensions
     with st.grid(3, min_column_width=300, gap="medium") as grid:
         for index, figure in enumerate(figures[:MOST_FIGURES]):
@@ -67,9 +81,12 @@ def show_actions(demonstrations: Demonstrations, divider: int) -> None:
             with grid.cell():
                 st.markdown("**Return of each episode**")
                 chart(returns, "returns", "Return of each episode, in order")
-        with grid.cell():
-            st.markdown("**Length of each episode**")
-            chart(lengths, "lengths", "Number of steps of each episode, in order")
+        if lengths is not None:
+            with grid.cell():
+                st.markdown("**Length of each episode**")
+                chart(lengths, "lengths", "Number of steps of each episode, in order")
+    if say_steps_needed("what became of each episode", demonstrations):
+        return
     finished = demonstrations.episode_finished
     if finished is not None and not finished.all():
         st.caption(

@@ -15,6 +15,7 @@ from sarl_dashboard.components.distributions import (
     show_distribution,
     show_legend,
 )
+from sarl_dashboard.components.journey.steps_needed import say_of_sample
 from sarl_dashboard.components.lists.feature_search import searched
 from sarl_dashboard.components.lists.pages import follow, number_of_pages, page_choice
 
@@ -35,6 +36,7 @@ def show_features(
         divider: Number of intervals of continuous actions.
     """
     st.subheader("Features")
+    say_of_sample("The bars", demonstrations)
     names = [row.name for row in rows]
     dimensions = label_dimensions(demonstrations, divider)
     by = 0
@@ -68,6 +70,7 @@ def show_features(
         for word, share in shares.items()
     ]
     if words:
+        say_of_sample("The words", demonstrations)
         columns, held, often = zip(*words, strict=True)
         st.dataframe(
             {"Words of": columns, "Word": held, "Steps": list(map(share_text, often))},
@@ -76,6 +79,11 @@ def show_features(
         )
     if not numbers:
         return
+    if demonstrations.sample_of is not None:
+        st.caption(
+            "The table is of all steps; a median is the nearest border of the bins they were "
+            "counted in."
+        )
     st.dataframe(
         {
             "Feature": [row.name for row in numbers],

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations, Summary
 from sarl_core.demonstrations.derived import formula_texts
+from sarl_core.demonstrations.samples import sample_text
 from sarl_core.demonstrations.warnings import find_warnings
-from sarl_core.explaining.figures.distributions import FeatureRow, feature_rows
+from sarl_core.explaining.figures.distributions import (
+    FeatureRow,
+    counted_feature_rows,
+    feature_rows,
+)
+from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.hold_out import leave_out_choice, parting_lines
 from sarl_dashboard.components.journey.words import with_words
@@ -26,6 +32,21 @@ class Contents:
     summary: Summary
     rows: tuple[FeatureRow, ...]
     warnings: tuple[str, ...]
+
+
+@cached()
+def counted_contents(mined: MinedData) -> Contents:
+    """The same of what was counted of all steps where they were mined."""
+    whole = mined.sample.whole
+    summary = replace(
+        mined.sample.summary(),
+        steps=whole.steps,
+        episodes=whole.episodes,
+        length_mean=whole.steps / whole.episodes,
+        return_mean=None,
+        return_std=None,
+    )
+    return Contents(summary, counted_feature_rows(mined), mined.notes)
 
 
 @cached(show_spinner="Counting …")
@@ -74,15 +95,22 @@ def show_overview(demonstrations: Demonstrations, contents: Contents) -> None:
                 "Sum of rewards of an episode, over the episodes that ended."
                 if summary.return_mean is not None
                 else "There are no rewards in these data."
+                if demonstrations.sample_of is None
+                else "A mined file holds no rewards."
             ),
         )
     parts = [
         f"Environment **{escaped(demonstrations.env_id or 'not given')}**",
         f"shown by **{escaped(demonstrations.agent)}**" if demonstrations.agent else "",
         f"seed {demonstrations.seed}" if demonstrations.seed is not None else "",
-        f"fingerprint `{demonstrations.digest[:12]}`",
+        f"fingerprint `{demonstrations.whole.digest[:12]}`",
     ]
     st.caption(" · ".join(part for part in parts if part))
+    if demonstrations.sample_of is not None:
+        st.caption(
+            f":material/data_usage: Mined on a cluster: the trees were counted on all "
+            f"{summary.steps:,} steps, and {sample_text(demonstrations)} are here to be looked at."
+        )
     formulas = formula_texts(demonstrations.derived)
     if formulas:
         with st.container(key="formulas", gap="xsmall"):
@@ -118,7 +146,7 @@ def show_columns(demonstrations: Demonstrations) -> None:
 def leave_episodes_out() -> None:
     """Leave episodes out; what is then shown is what remains."""
     whole = all_demonstrations()
-    if whole is None or whole.n_episodes < 2:
+    if whole is None or whole.n_episodes < 2 or whole.sample_of is not None:
         return
     lines = parting_lines(whole)
     with st.expander("Leave episodes out", icon=":material/playlist_remove:"):

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
+from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import ColumnRole, read_files
+from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError
+from sarl_core.mining.distributed.mined_data import MinedData
+from sarl_core.mining.distributed.mined_files import is_mined_file, read_mined_data
 from sarl_dashboard.components.column_form import ColumnForm
 from sarl_dashboard.components.journey.words import with_words
-from sarl_dashboard.state.data import set_upload, uncombined_demonstrations
+from sarl_dashboard.state.data import set_upload, steps_of, uncombined_demonstrations
 from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import refuse
@@ -40,12 +44,7 @@ def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
         return
     try:
         with st.spinner("Reading and checking …"):
-            demonstrations = read_files(
-                files,
-                env_id=environment(),
-                columns=columns,
-                missing="drop" if st.session_state.get("upload_missing") else "refuse",
-            )
+            upload = _read(files, columns)
     except SarlError as error:
         st.session_state["_upload_error"] = str(error)
         return
@@ -58,8 +57,27 @@ def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
             )
         )
         return
-    set_upload(demonstrations, file_name=", ".join(name for _, name in files))
-    st.toast(f"Read {len(demonstrations):,} steps.", icon=":material/check:")
+    set_upload(upload, file_name=", ".join(name for _, name in files))
+    st.toast(f"Read {steps_of(upload).whole.steps:,} steps.", icon=":material/check:")
+
+
+def _read(
+    files: Sequence[tuple[memoryview, str]], columns: Mapping[str, ColumnRole] | None
+) -> Demonstrations | MinedData:
+    if any(is_mined_file(name) for _, name in files):
+        (content, name), *others = files
+        if others:
+            raise InputError(
+                f"{len(files)} files: a mined file holds everything by itself; upload it alone"
+            )
+        with naming(name):
+            return read_mined_data(content)
+    return read_files(
+        files,
+        env_id=environment(),
+        columns=columns,
+        missing="drop" if st.session_state.get("upload_missing") else "refuse",
+    )
 
 
 def _read_again() -> None:
@@ -116,7 +134,8 @@ def upload_section(*, expanded: bool) -> None:
                 ".gz; the pair obs.csv and actions.csv; one file an episode; the ZIP of a folder "
                 "as Minari, LeRobot or Hugging Face's datasets write it. A table has one row a "
                 "step: episode, step, obs_<name> …, action or action_<name> …, and if there are "
-                "any reward, terminated, truncated."
+                "any reward, terminated, truncated. Or a .mined file, which is what a cluster "
+                "leaves of more steps than fit into memory."
             ),
         )
         right.selectbox(

@@ -21,11 +21,12 @@ from sarl_dashboard.state.data import (
     UPLOAD,
     chosen_dataset,
     dataset_label,
+    mined_data,
     raw_demonstrations,
     upload_name,
 )
 from sarl_dashboard.state.thresholds import chosen_thresholds
-from sarl_dashboard.text import escaped
+from sarl_dashboard.text import escaped, size_text
 
 
 @dataclass(frozen=True)
@@ -83,8 +84,10 @@ def stages_of(raw: Demonstrations) -> tuple[Stage, ...]:
 def _data(raw: Demonstrations | None) -> Stage:
     if raw is None:
         return Stage("Data", False, "nothing uploaded yet", "demonstrations.py")
-    size = f"{counted(len(raw), 'step')} in {counted(raw.n_episodes, 'episode')}"
+    size = size_text(raw)
     origin = "uploaded" if chosen_dataset() == UPLOAD else "shipped"
+    if raw.sample_of is not None:
+        origin = "mined on a cluster"
     return Stage("Data", True, f"{size}, {origin}", "demonstrations.py")
 
 
@@ -113,8 +116,12 @@ def _rules() -> Stage:
 
 
 def _evidence() -> Stage:
+    mined = mined_data()
+    if mined is not None and mined.held_out:
+        episodes = counted(mined.held_out_episodes, "episode")
+        return Stage("Evidence", True, f"{episodes} held out where it was mined", "evidence.py")
     share = hold_out.chosen().share
-    if share:
+    if share and mined is None:
         return Stage(
             "Evidence", True, f"{share_text(share)} of the episodes held out", "evidence.py"
         )
