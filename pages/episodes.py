@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import streamlit as st
 
+from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.state.data import all_demonstrations, require_demonstrations
 from sarl_dashboard.views.episodes.steps import show_episodes
 
@@ -15,4 +16,5 @@ st.caption(
 require_demonstrations()
 demonstrations = all_demonstrations()
 assert demonstrations is not None
-show_episodes(demonstrations)
+if not say_steps_needed("going through an episode", demonstrations):
+    show_episodes(demonstrations)

@@ -10,6 +10,7 @@ from sarl_core.explaining.words.cross_fit import influence_sentences
 from sarl_dashboard.components.edits_notice import without_edits_notice
 from sarl_dashboard.components.elsewhere import elsewhere_notice
 from sarl_dashboard.components.hold_out import leave_out_choice
+from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.data import all_demonstrations, require_demonstrations
@@ -75,11 +76,12 @@ elif contradictions.open:
         show_contradictions(evidence.parts.remaining, evidence.rule_set)
 elif left_out.open:
     with left_out:
-        st.caption(
-            "Episodes that are left out are there for nothing: rules are neither mined from them "
-            "nor tried on them, on any page. The file stays as it is."
-        )
-        leave_out_choice(demonstrations)
+        if not say_steps_needed("leaving episodes out", demonstrations):
+            st.caption(
+                "Episodes that are left out are there for nothing: rules are neither mined from "
+                "them nor tried on them, on any page. The file stays as it is."
+            )
+            leave_out_choice(demonstrations)
 elif evidence.rule_set.rules:
     with enough:
         show_enough(evidence)

@@ -7,6 +7,7 @@ from functools import partial
 import streamlit as st
 
 from sarl_dashboard.components.downloads import as_file, download
+from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.state import given_names
 from sarl_dashboard.state.data import all_demonstrations, raw_demonstrations, require_demonstrations
 from sarl_dashboard.state.data_words import say_given
@@ -58,11 +59,12 @@ st.caption(
     "A formula makes one feature of several: a distance over a speed is the time that is left, a "
     "difference of speeds is how fast a gap closes. Rules are then mined with it, on every page."
 )
-formula_editor(raw, named)
-show_formulas(raw, named)
+if not say_steps_needed("trying a formula", raw):
+    formula_editor(raw, named)
+    show_formulas(raw, named)
 with st.container(horizontal=True):
     download(
-        "Download as Parquet",
+        "Download as Parquet" if raw.sample_of is None else "Download the sample as Parquet",
         partial(as_file, named),
         f"{file_name(named.env_id)}.parquet",
         key="names_parquet",

@@ -13,8 +13,8 @@ from sarl_dashboard.components.edits_notice import without_edits_notice
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import in_force, rule_base
 from sarl_dashboard.state.compact_set import chosen_compact
-from sarl_dashboard.state.data import held_out_demonstrations, require_demonstrations
-from sarl_dashboard.state.mined import grown_trees
+from sarl_dashboard.state.data import require_demonstrations
+from sarl_dashboard.state.mined import grown_trees, tried_on
 from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.thresholds.combinations import combinations_choice
@@ -42,7 +42,7 @@ if not rule_base.at_thresholds() and compact is None:
     )
 top = st.container()
 combinations_choice()
-display = chosen_display(trees, compact, held_out_demonstrations())
+display = chosen_display(trees, compact, tried_on())
 thresholds = chosen_thresholds()
 landscape = display.landscape(thresholds)
 if display.surfaces:

@@ -10,6 +10,9 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_dashboard.components.journey.environment_needed import require_environment
+from sarl_dashboard.components.journey.steps_needed import say_steps_needed
+from sarl_dashboard.components.run_bar import bars_at_work
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state.data import require_demonstrations
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.improve.order import order_of
@@ -24,6 +27,9 @@ st.caption(
 )
 require_environment(PLACE)
 demonstrations = require_demonstrations()
+if say_steps_needed("improving rules", demonstrations):
+    bars_at_work(PLACE)
+    end_page()
 choices = settings(demonstrations)
 order = None
 try:

@@ -32,10 +32,10 @@ def needs_steps_text(what: str, demonstrations: Demonstrations) -> str:
         A sentence without a full stop.
     """
     here, steps = len(demonstrations), demonstrations.whole.steps
-    only = f"only a sample of {here:,} is here" if here < steps else "their trees are final"
+    part = f", with a sample of {here:,}" if here < steps else ""
     return (
-        f"{what} needs the steps themselves, and the {steps:,} of this file were mined on a "
-        f"cluster: {only}; choose demonstrations that hold their steps, or mine these again"
+        f"{what} needs the demonstrations themselves, and this file is what was left of {steps:,} "
+        f"steps that were mined on a cluster{part}; choose demonstrations, or mine those again"
     )
 
 

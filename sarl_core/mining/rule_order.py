@@ -102,7 +102,7 @@ def rules_for(
             "rules' features: recoded(demonstrations, rules.source.features, called='the log')"
         )
     _check_actions(fitted.rule_set.actions, demonstrations)
-    if fitted.rule_set is rule_set and rule_set.source.digest == demonstrations.digest:
+    if fitted.rule_set is rule_set and rule_set.source.digest == demonstrations.whole.digest:
         return Fitted(rule_set, ())  # mined from these very pairs
     return fitted
 

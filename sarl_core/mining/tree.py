@@ -110,6 +110,8 @@ class PolicyTree:
         learner: What chose its queries.
         sample_place: Where the pairs of the row's leaf begin, for each row of `sample_order`, (M,)
             int64, ascending; None where that holds all pairs.
+        least_support: No node with less was split further: at a lower minimum support there are
+            rules that this tree does not know.
     """
 
     index: int
@@ -130,6 +132,7 @@ class PolicyTree:
     number: NDArray[np.int64]
     learner: Learner = "exact"
     sample_place: NDArray[np.int64] | None = None
+    least_support: float = 0.0
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""

@@ -168,7 +168,9 @@ def _basis(rule_set: RuleSet, demonstrations: Demonstrations | None) -> Basis:
         ground = ground_of(rule_set, sampled_states([rule_set]))
         return Basis(ground, None, "random state")
     ground = ground_of(rule_set, demonstrations.observations)
-    return Basis(ground, labels_of(rule_set, demonstrations), "demonstrated state")
+    is_part = len(demonstrations) < demonstrations.whole.steps
+    noun = "sampled state" if is_part else "demonstrated state"
+    return Basis(ground, labels_of(rule_set, demonstrations), noun)
 
 
 def verdicts_of_set(rule_set: RuleSet) -> Verdicts:

@@ -161,6 +161,18 @@ def tried_on() -> Demonstrations | MinedData | None:
     return mined if mined.held_out else None
 
 
+def episodes_tried_on() -> tuple[int, int]:
+    """How many episodes are held out, and how many there are with these."""
+    mined, parts = mined_data(), data_parts()
+    if mined is not None:
+        held_out = mined.held_out_episodes
+        return held_out, mined.sample.whole.episodes + held_out
+    if parts is None:
+        return 0, 0
+    held_out = 0 if parts.held_out is None else parts.held_out.n_episodes
+    return held_out, parts.remaining.n_episodes
+
+
 @cached()
 def _held_out_counts(trees: Trees, held_out: Demonstrations) -> tuple[EpisodeCounts, ...]:
     return count_held_out(trees, held_out)

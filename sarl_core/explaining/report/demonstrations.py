@@ -11,6 +11,7 @@ from markupsafe import Markup
 from sarl_core.decimals import decimal_on_scale, decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations, observed_features
 from sarl_core.demonstrations.derived import Combination, formula_texts
+from sarl_core.demonstrations.samples import sample_text
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import FeatureRow, episode_series, feature_rows
 from sarl_core.explaining.report.svg import MUTED, NEUTRAL, columns, share_bar
@@ -196,16 +197,25 @@ def _sentences(demonstrations: Demonstrations) -> tuple[str, ...]:
         for count, noun in ((width - len(shares), "number"), (len(shares), "word"))
         if count
     ]
+    whole = demonstrations.whole
     sentences = [
-        f"{who} acted{where} for {counted(len(demonstrations), 'step')} in "
-        f"{counted(demonstrations.n_episodes, 'episode')}. At every step it saw the state of the "
+        f"{who} acted{where} for {counted(whole.steps, 'step')} in "
+        f"{counted(whole.episodes, 'episode')}. At every step it saw the state of the "
         f"task, {' and '.join(seen)} listed below, and chose an action. An episode is one attempt "
         "from start to end.",
     ]
+    if demonstrations.sample_of is not None:
+        sentences.append(
+            "The rules were mined from all of these steps on a cluster, and this report was made "
+            f"with {sample_text(demonstrations)}: what a rule says of support and confidence "
+            "counts all of them, and every other number or picture of states the sample."
+        )
     for title, words in shares.items():
         parts = [f"{word} in {share_text(share)}" for word, share in words.items()]
         parts[0] += " of the steps"
         sentences.append(f"The {title} was {', '.join(parts)}.")
+    if demonstrations.sample_of is not None:
+        return tuple(sentences)  # of a sample no episode is whole
     summary, finished = demonstrations.summary(), demonstrations.episode_finished
     if summary.return_mean is not None:
         ended = "a finished episode" if finished is not None and finished.any() else "an episode"
@@ -228,7 +238,7 @@ def _sentences(demonstrations: Demonstrations) -> tuple[str, ...]:
 
 def _returns(demonstrations: Demonstrations) -> tuple[Markup, str]:
     returns = demonstrations.episode_returns
-    if returns is None:
+    if returns is None or demonstrations.sample_of is not None:
         return Markup(), ""
     series = episode_series(returns, demonstrations.episode_finished, most=120)
     least, most = float(returns.min()), float(returns.max())

@@ -131,11 +131,11 @@ def gaps(
 def _coverage(rule_set: RuleSet, tally: Tally, dimension: int) -> Coverage:
     share = tally.covered(dimension)
     action = rule_set.actions[dimension]
+    noun = "sampled state" if tally.sampled else "demonstrated state"
     left = tally.labels[tally.rules[:, dimension] < 0, dimension]
     return Coverage(
         name=action.name if len(rule_set.actions) > 1 else "",
-        text=f"{share.part:,} of {counted(share.whole, 'demonstrated state')} "
-        f"({share_text(share.value)})",
+        text=f"{share.part:,} of {counted(share.whole, noun)} ({share_text(share.value)})",
         bar=share_bar(share.value, NEUTRAL),
         uncovered=action_shares(np.bincount(left, minlength=action.n_labels), action)
         if len(left)
@@ -144,6 +144,8 @@ def _coverage(rule_set: RuleSet, tally: Tally, dimension: int) -> Coverage:
 
 
 def _contradictions(demonstrations: Demonstrations, divider: int) -> str:
+    if demonstrations.sample_of is not None:
+        return ""
     if len(demonstrations) > _MOST_COMPARED or demonstrations.n_episodes < 2:
         return ""
     contradictions = find_contradictions(demonstrations, divider=divider)
@@ -180,7 +182,7 @@ def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> 
         f"rests on fewer than {FEW_STATES} states: it may be chance.",
         f"rest on fewer than {FEW_STATES} states each: they may be chance.",
     )
-    if tally.same:
+    if tally.same and not tally.sampled:
         apart = [
             index
             for index, rule in rules
@@ -226,7 +228,7 @@ def _beyond(
         player=played.player.name,
         steps=f"{len(states):,}",
         covered=share_text(float(covered.mean())),
-        outside=share_text(float(outside.mean())),
+        outside="not known" if demonstrations.sample_of else share_text(float(outside.mean())),
         far=share_text(float(_far(states, rules, rule_set).mean())) if boxed else "",
     )
 

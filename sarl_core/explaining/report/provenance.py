@@ -53,7 +53,7 @@ def facts(
     """
     source = rule_set.source
     entries = [
-        ("Demonstrations", _named(demonstrations.digest, demonstrations_name)),
+        ("Demonstrations", _named(demonstrations.whole.digest, demonstrations_name)),
         ("Rules", _named(rules_digest(rule_set), rules_name)),
     ]
     if not tally.same:
@@ -133,26 +133,22 @@ def mining_command(
         rule.origin == "mined"
         and rule.enabled
         and not (rule.pinned or rule.regrown)
-        and rule.held_out is None
+        and (rule.held_out is None or given.sample_of is not None)
         for rule in rule_set.rules
     )
-    if rule_set.cut != "thresholds" or rule_set.source.digest != given.digest or not plain:
+    if rule_set.cut != "thresholds" or rule_set.source.digest != given.whole.digest or not plain:
         return None
+    if given.sample_of is not None:  # everything else was settled when it was mined
+        return command_line("mine", demonstrations, _limits(rule_set) | {"--out": rules})
     derived = _derived_options(given, read or given.deriving(()), rule_set.divider)
     if derived is None:
         return None
-    limits = rule_set.thresholds
-    named = next((name for name, pair in NAMED_SETTINGS.items() if pair == limits), None)
     continuous = any(action.is_interval for action in rule_set.actions)
     return command_line(
         "mine",
         demonstrations,
         {
-            "--setting": named,
-            "--support": None if named else threshold_text(limits.support),
-            "--confidence": None if named else threshold_text(limits.confidence),
-            "--lift": threshold_text(limits.lift) if limits.lift else None,
-            "--max-depth": limits.max_depth,
+            **_limits(rule_set),
             "--divider": rule_set.divider if continuous else None,
             "--learner": _learner_option(rule_set),
             **derived,
@@ -162,6 +158,19 @@ def mining_command(
             "--out": rules,
         },
     )
+
+
+def _limits(rule_set: RuleSet) -> dict[str, object]:
+    """The thresholds as options."""
+    limits = rule_set.thresholds
+    named = next((name for name, pair in NAMED_SETTINGS.items() if pair == limits), None)
+    return {
+        "--setting": named,
+        "--support": None if named else threshold_text(limits.support),
+        "--confidence": None if named else threshold_text(limits.confidence),
+        "--lift": threshold_text(limits.lift) if limits.lift else None,
+        "--max-depth": limits.max_depth,
+    }
 
 
 def _learner_option(rule_set: RuleSet) -> str | None:

@@ -31,6 +31,7 @@ from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.files import as_path, whole_file
 from sarl_core.mining.combining.choice import pairs_chosen_from
+from sarl_core.mining.edit_counts import is_plain
 from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.growing.growth import grow_policy_trees
@@ -318,7 +319,7 @@ def _about_pictures(
     elsewhere = (
         ", none of which was demonstrated"
         if recorded is not None
-        and (last < recorded or first >= recorded + demonstrations.n_episodes)
+        and (last < recorded or first >= recorded + demonstrations.whole.episodes)
         else ""
     )
     return (
@@ -341,11 +342,16 @@ def _key_numbers(rule_set: RuleSet, counts: Tally) -> tuple[tuple[str, str], ...
     rules = [rule for rule in rule_set.rules if rule.enabled]
     features = rule_set.source.features
     merged = sum(merged_length(rule, features) for rule in rules) / max(len(rules), 1)
+    coverage, right, states = counts.coverage, followed.value, "the demonstrated states"
+    if counts.sampled and is_plain(rule_set.rules):
+        coverage, right = rule_set.coverage, rule_set.fidelity
+    elif counts.sampled:
+        states = "a sample of the demonstrated states"
     return (
         (f"{len(rules):,}", "rule" if len(rules) == 1 else "rules"),
         (f"{merged:.1f}", "conditions a rule, on average"),
-        (share_text(counts.coverage), "of the demonstrated states have a rule"),
-        (share_text(followed.value), "of these show what the rule says"),
+        (share_text(coverage), f"of {states} have a rule"),
+        (share_text(right), "of these show what the rule says"),
     )
 
 
@@ -353,6 +359,8 @@ def _elsewhere(
     rule_set: RuleSet, demonstrations: Demonstrations, trees: Sequence[PolicyTree] | None
 ) -> tuple[str, str]:
     """What the rules are worth where they were not mined, and a warning; "" where not known."""
+    if demonstrations.sample_of is not None:
+        return "", ""  # episodes that were held out where they were mined stand at each rule
     if len(demonstrations) > _MOST_FITTED or not mined_again(rule_set, trees):
         return "", ""
     divider = rule_set.divider

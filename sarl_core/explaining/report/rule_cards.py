@@ -190,6 +190,13 @@ def tags(rule: Rule) -> tuple[str, ...]:
 
 def _support(rule: Rule, applying: int, decided: int, tally: Tally) -> str:
     number = f"{decided:,}" if decided else "none"
+    if tally.sampled and rule.origin == "mined":
+        decides = share_text(decided / applying) if applying else "none"
+        return (
+            f"Applies in {share_text(rule.support)} of the demonstrated states "
+            f"({counted(rule.samples, 'state')})"
+            + (f"; in the sample it decides {decides} of them." if decided != applying else ".")
+        )
     if tally.same and rule.origin == "mined" and rule.samples == applying:
         return (
             f"Applies in {share_text(rule.support)} of the demonstrated states "
@@ -218,7 +225,8 @@ def _evidence(
     if not (tally.same or tally.split) or rule.origin != "mined":
         here = tally.by_episode[index]
         decided = "that it decides " if here.samples != applying else ""
-        evidence.append(_tried(f"{decided}of this report's demonstrations", here, threshold))
+        shown = "the sample" if tally.sampled else "this report's demonstrations"
+        evidence.append(_tried(f"{decided}of {shown}", here, threshold))
     return tuple(evidence)
 
 

@@ -42,7 +42,8 @@ class Tally:
     """Rules counted on N demonstrated pairs with m action dimensions.
 
     Attributes:
-        same: Whether the rules were mined from these very demonstrations.
+        same: Whether the rules were mined from these very demonstrations, or all of them.
+        sampled: Whether they are a sample of those, which was counted where it was mined.
         split: Whether they were mined from some of these episodes and tried on all the others.
         rules: Index of the rule in force or -1, (N, m) int64.
         labels: What the expert did, (N, m) int64.
@@ -51,6 +52,7 @@ class Tally:
     """
 
     same: bool
+    sampled: bool
     split: bool
     rules: NDArray[np.int64]
     labels: NDArray[np.int64]
@@ -142,8 +144,10 @@ def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
         count, in_force[inside], row, right[inside], demonstrations
     ).held_out()
     shares = tuple(Share(one.correct, one.samples) for one in by_episode)
+    same = rule_set.source.digest == demonstrations.whole.digest
     return Tally(
-        same=rule_set.source.digest == demonstrations.digest,
+        same=same,
+        sampled=same and len(demonstrations) < rule_set.source.steps,
         split=_is_split(rule_set, demonstrations, shares),
         rules=in_force,
         labels=labels,

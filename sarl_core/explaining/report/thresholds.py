@@ -185,7 +185,8 @@ def thresholds_part(
     if rule_set.cut == "leaves" or trees is None:
         return ThresholdsPart((*_built(rule_set, entries), *then), None, "", (), facts)
     limits = rule_set.thresholds
-    landscape = _landscape(trees, limits, _SUPPORTS, _CONFIDENCES)
+    supports = [support for support in _SUPPORTS if support >= _least(trees)]
+    landscape = _landscape(trees, limits, supports, _CONFIDENCES)
     same = (
         ""
         if tally.same
@@ -278,6 +279,11 @@ def _short(share: float) -> str:
     return threshold_text(float(np.round(100 * share, 6)))
 
 
+def _least(trees: Sequence[PolicyTree]) -> float:
+    """The least minimum support at which the trees know all rules."""
+    return max(tree.least_support for tree in trees)
+
+
 def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighbour, ...]:
     support, confidence = limits.support, limits.confidence
     pairs: dict[str, tuple[float, float]] = {"in force": (support, confidence)}
@@ -293,7 +299,7 @@ def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighb
         pairs[name] = (setting.support, setting.confidence)
     neighbours: dict[tuple[float, float], Neighbour] = {}
     for name, pair in pairs.items():
-        if pair in neighbours:
+        if pair in neighbours or pair[0] < _least(trees):
             continue
         at = _landscape(trees, Thresholds(*pair, limits.lift, limits.max_depth), (), ())
         neighbours[pair] = Neighbour(

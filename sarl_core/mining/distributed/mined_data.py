@@ -66,7 +66,6 @@ class MinedData:
             where none were.
         share: Of the episodes that was to be held out.
         seed: By which they were drawn.
-        min_support: No node with less was split further.
     """
 
     trees: tuple[PolicyTree, ...]
@@ -76,7 +75,6 @@ class MinedData:
     held_out: tuple[EpisodeCounts, ...] = ()
     share: float = 0.0
     seed: int = 0
-    min_support: float = 0.0
 
     def __repr__(self) -> str:
         """Its size, as `MinedData(steps=900000, episodes=900, nodes=57869, sample=50000)`."""
@@ -98,6 +96,11 @@ class MinedData:
         )
 
     @property
+    def min_support(self) -> float:
+        """No node with less was split further."""
+        return self.trees[0].least_support
+
+    @property
     def divider(self) -> int:
         """Number of intervals of continuous dimensions."""
         return self.trees[0].divider
@@ -106,7 +109,7 @@ class MinedData:
     def digest(self) -> str:
         """Fingerprint (blake2b, 32 hex digits) of the trees, the sample and what was counted."""
         digest = hashlib.blake2b(digest_size=16)
-        for part in (*(tree.digest for tree in self.trees), self.sample.digest, self.min_support):
+        for part in (*(tree.digest for tree in self.trees), self.sample.digest):
             digest.update(f"{part} ".encode())
         for counts in self.held_out:
             for column in (counts.subject, counts.episode, counts.samples, counts.correct):

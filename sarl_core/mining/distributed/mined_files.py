@@ -242,7 +242,7 @@ def _data(
             learner=document.learner,
             source=source.with_splits(_splits(arrays, at, len(features))),
         )
-        trees.append(tree)
+        trees.append(replace(tree, least_support=document.min_support))
         boxes.append(_shaped(arrays[f"{at}/box"], (4, n, len(features)), np.float64))
         if document.held_out:
             held_out.append(_episode_counts(arrays, f"{at}/held_out", tree))
@@ -254,7 +254,6 @@ def _data(
         tuple(held_out),
         document.held_out,
         document.seed,
-        document.min_support,
     )
 
 

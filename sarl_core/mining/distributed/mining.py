@@ -327,7 +327,7 @@ def _mined(
                 (LOW_QUANTILE, HIGH_QUANTILE),
             )
         )
-        trees.append(tree)
+        trees.append(replace(tree, least_support=plan.min_support))
     return MinedData(
         tuple(trees),
         sample,
@@ -344,7 +344,6 @@ def _mined(
         else (),
         plan.hold_out,
         plan.seed,
-        plan.min_support,
     )
 
 

@@ -105,8 +105,11 @@ def grow_policy_trees(
         ]
         del bins  # half as large as the states are, and counting needs room, too
         return tuple(
-            count_tree(
-                structure, demonstrations, index, divider=divider, learner=chosen, leaves=leaves
+            replace(
+                count_tree(
+                    structure, demonstrations, index, divider=divider, learner=chosen, leaves=leaves
+                ),
+                least_support=float(min_support),
             )
             for index, (structure, leaves) in enumerate(structures)
         )
@@ -114,7 +117,8 @@ def grow_policy_trees(
     def grown(index: int) -> PolicyTree:
         structure = exact_structure(states, labels[index], max_depth=max_depth, seed=seed)
         tree = count_tree(structure, demonstrations, index, divider=divider)
-        return tree if least <= 2 else _cut_back(tree, least, demonstrations)
+        cut = tree if least <= 2 else _cut_back(tree, least, demonstrations)
+        return replace(cut, least_support=float(min_support))
 
     if len(labels) == 1:
         return (grown(0),)

@@ -35,7 +35,10 @@ class ParetoPoint(NamedTuple):
 
 
 def pareto_front(
-    trees: Sequence[PolicyTree], *, lift_min: float = 0.0, max_depth: int | None = None
+    trees: Sequence[PolicyTree],
+    *,
+    lift_min: float = 0.0,
+    max_depth: int | None = None,
 ) -> tuple[ParetoPoint, ...]:
     """Rule sets for which no other has fewer rules, more coverage and more fidelity.
 
@@ -49,10 +52,12 @@ def pareto_front(
         max_depth: Longest rule.
 
     Returns:
-        By number of rules; of several thresholds with one result, the lowest.
+        By number of rules; of several thresholds with one result, the lowest. At no lower minimum
+        support than the trees were grown down to.
     """
     rectangles = [rule_rectangles(t, lift_min=lift_min, max_depth=max_depth) for t in trees]
-    supports = _edges([r.support for r in rectangles])
+    least = max(tree.least_support for tree in trees)
+    supports = _edges([r.support[r.support >= least] for r in rectangles])
     confidences = _edges([r.confidence for r in rectangles])
     if not len(supports):
         return ()

@@ -107,9 +107,10 @@ def show_overview(demonstrations: Demonstrations, contents: Contents) -> None:
     ]
     st.caption(" · ".join(part for part in parts if part))
     if demonstrations.sample_of is not None:
+        is_part = len(demonstrations) < summary.steps
         st.caption(
-            f":material/data_usage: Mined on a cluster: the trees were counted on all "
-            f"{summary.steps:,} steps, and {sample_text(demonstrations)} are here to be looked at."
+            ":material/data_usage: Mined on a cluster: what is said of rules counts all steps. To "
+            f"be looked at, {sample_text(demonstrations)} {'is' if is_part else 'are'} here."
         )
     formulas = formula_texts(demonstrations.derived)
     if formulas:

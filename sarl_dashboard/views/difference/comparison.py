@@ -21,6 +21,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.decisions import ground_of
 from sarl_core.shielding.disagreement import Disagreement, disagreement, sampled_states
 from sarl_dashboard.cache import cached
+from sarl_dashboard.components.journey.steps_needed import say_of_sample
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import notes_notice, switch
 from sarl_dashboard.components.tables import action_column, row_height, table_height
@@ -62,7 +63,10 @@ class RuleSetComparison:
     @property
     def noun(self) -> str:
         """What one of the states is called."""
-        return "random state" if self.demonstrations is None else "demonstrated state"
+        of = self.demonstrations
+        if of is not None and len(of) < of.whole.steps:
+            return "sampled state"
+        return "random state" if of is None else "demonstrated state"
 
 
 @st.fragment
@@ -75,6 +79,8 @@ def comparison() -> None:
     try:
         show_overview(sides, _different)
         compared = _compare(*_pair(sides))
+        if compared.demonstrations is not None:
+            say_of_sample("The states of this page", compared.demonstrations)
         _show_states(compared)
         _show_rules(compared)
     except SarlError as error:

@@ -19,6 +19,7 @@ from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_core.mining.tree import PolicyTree, splits_of
 from sarl_core.shielding.effects import Verdicts, change
 from sarl_dashboard.cache import cached
+from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.tables import row_height, table_height
 from sarl_dashboard.state import edits, in_force
@@ -88,6 +89,11 @@ def part(of: Base, rule: Rule, now: Verdicts) -> None:
     """Choose a node on the way to a rule and another query, and regrow what lies below it."""
     with st.container(border=True, key="regrow"):
         st.markdown("**Regrow a part of the tree**")
+        demonstrations = chosen_demonstrations()
+        if demonstrations is not None and say_steps_needed(
+            "regrowing a part of the tree", demonstrations
+        ):
+            return
         try:
             trees = edits.trees_with(of, edits.history(of).edits)
         except InputError as problem:

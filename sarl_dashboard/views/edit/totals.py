@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import streamlit as st
 
+from sarl_core.demonstrations.samples import sample_text
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.html.number_cards import Number, number_cards
 from sarl_core.explaining.words.edits import edit_text, edits_change_text
@@ -102,7 +103,10 @@ def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
 
 def where(of: Base) -> str:
     """Which states these are, where they are not the demonstrated ones."""
-    if edits.basis_of(of).expert is not None:
+    demonstrations = edits.demonstrations_for(of.rule_set)
+    if demonstrations is not None:
+        if len(demonstrations) < demonstrations.whole.steps:
+            return f" What edits change is counted on {sample_text(demonstrations)}."
         return ""
     return (
         " The chosen demonstrations are of something else, so this is counted on random states "

@@ -19,6 +19,7 @@ from sarl_core.mining.validation.contradictions import (
 )
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.components.worked_out import worked_out
@@ -40,6 +41,8 @@ def show_contradictions(remaining: Demonstrations, rule_set: RuleSet) -> None:
         remaining: Those that are not left out.
         rule_set: Knows the actions and their intervals.
     """
+    if say_steps_needed("looking for contradictions", remaining):
+        return
     divider = rule_set.divider
     reach = float(
         st.select_slider(

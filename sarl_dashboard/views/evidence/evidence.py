@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.validation.cross_fitting import Judged, judge
 from sarl_core.mining.validation.episode_counts import Influence, count_rules, most_influential
 from sarl_core.mining.validation.holding_out import more_episodes
 from sarl_dashboard.cache import cached
-from sarl_dashboard.state.data import data_parts
+from sarl_dashboard.state.data import data_parts, mined_data
 from sarl_dashboard.state.hold_out import Parts
-from sarl_dashboard.state.mined import rules_at
+from sarl_dashboard.state.mined import episodes_tried_on, rules_at
 
 
 @dataclass(frozen=True)
@@ -41,10 +42,16 @@ class RuleSetEvidence:
     Attributes:
         parts: Of the demonstrations.
         rule_set: The rules.
+        mined: The file that they are mined from; None where the steps are here.
+        episodes: How many there are, those that are held out among them.
+        held_out: How many of them are held out.
     """
 
     parts: Parts
     rule_set: RuleSet
+    mined: MinedData | None
+    episodes: int
+    held_out: int
 
     @property
     def thresholds(self) -> Thresholds:
@@ -54,24 +61,31 @@ class RuleSetEvidence:
     @property
     def findings(self) -> Findings:
         """What the page says."""
-        return _findings(self.parts, self.rule_set)
+        return _findings(self)
 
 
 def chosen_evidence() -> RuleSetEvidence:
     """That of what is chosen; there are demonstrations."""
     parts = data_parts()
     assert parts is not None
-    return RuleSetEvidence(parts, rules_at())
+    held_out, episodes = episodes_tried_on()
+    return RuleSetEvidence(parts, rules_at(), mined_data(), episodes, held_out)
 
 
 @cached(show_spinner="Weighing the evidence …")
-def _findings(parts: Parts, rule_set: RuleSet) -> Findings:
+def _findings(evidence: RuleSetEvidence) -> Findings:
+    rule_set, held_out = evidence.rule_set, evidence.parts.held_out
     rules = tuple(sorted(rule_set, key=lambda rule: -rule.samples))
     threshold = rule_set.thresholds.confidence
-    missing = more_episodes(rules, parts.remaining.n_episodes, threshold)
-    if parts.held_out is None:
+    missing = more_episodes(rules, evidence.episodes, threshold)
+    if not evidence.held_out:
         return Findings(rules, missing, threshold, None, (None,) * len(rules))
-    counts = count_rules(replace(rule_set, rules=rules), parts.held_out)
+    ordered = replace(rule_set, rules=rules)
+    if evidence.mined is not None:
+        counts = evidence.mined.count_rules(ordered)
+    else:
+        assert held_out is not None
+        counts = count_rules(ordered, held_out)
     influences = tuple(
         most_influential(*counts.of(place), counts.numbers, counts.lengths)
         for place in range(len(rules))

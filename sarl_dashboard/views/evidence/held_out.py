@@ -5,9 +5,11 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.samples import needs_steps_text
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import hold_out
+from sarl_dashboard.state.mined import episodes_tried_on
 from sarl_dashboard.text import in_full
 
 
@@ -18,6 +20,9 @@ def _share_text(share: str) -> str:
 
 def hold_out_choice(whole: Demonstrations) -> None:
     """How many episodes are held out, and which."""
+    if whole.sample_of is not None:
+        _say_settled(whole)
+        return
     choice, parts = hold_out.chosen(), hold_out.parted(whole)
     # The widgets follow the URL, so a link and the browser's "back" both reach them. Only where
     # they differ: a value that is set takes back what a hand is moving just then.
@@ -64,4 +69,20 @@ def hold_out_choice(whole: Demonstrations) -> None:
     st.caption(
         f"{counted(len(numbers), 'episode')} of {parts.remaining.n_episodes:,} held out, with "
         f"{counted(len(parts.held_out), 'step')}: {named}. Every page mines from the others."
+    )
+
+
+def _say_settled(sample: Demonstrations) -> None:
+    """What was held out when a mined file was made; that is not chosen here."""
+    held_out, episodes = episodes_tried_on()
+    if not held_out:
+        st.caption(
+            "Nothing was held out when these steps were mined, so the dots below are of what the "
+            "rules were mined from. They flatter: each rule was chosen for being right there. "
+            + in_full(needs_steps_text("holding episodes out", sample))
+        )
+        return
+    st.caption(
+        f"{counted(held_out, 'episode')} of {episodes:,} were held out when these steps were "
+        "mined, and counted at every rule. Holding out others needs the demonstrations themselves."
     )

@@ -11,6 +11,7 @@ from sarl_core.mining.language import counted
 from sarl_core.mining.validation.learning_curve import MiningCurve, learning_curve
 from sarl_core.progress import Progress
 from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.components.worked_out import worked_out
 from sarl_dashboard.views.evidence.evidence import RuleSetEvidence
 
@@ -20,6 +21,8 @@ ORDERS = 6
 def show_curve(evidence: RuleSetEvidence) -> None:
     """What rules of fewer episodes would have been."""
     parts = evidence.parts
+    if say_steps_needed("a learning curve", parts.mined):
+        return
     if parts.mined.n_episodes < 2:
         st.info(
             "There is one episode only. A learning curve needs several; give demonstrations with "

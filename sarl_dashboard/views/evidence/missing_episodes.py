@@ -38,7 +38,12 @@ def show_enough(evidence: RuleSetEvidence) -> None:
     if findings.judged is None:
         st.info(
             "Whether the demonstrations are enough, only episodes can say that the rules were not "
-            "mined from. Hold some out above.",
+            "mined from. "
+            + (
+                "Hold some out above."
+                if evidence.mined is None
+                else "Hold some out where these steps are mined."
+            ),
             icon=":material/info:",
         )
         return

@@ -60,11 +60,8 @@ def show_overview(evidence: RuleSetEvidence) -> None:
             for name, meaning in MEANINGS
         ]
         sentences = [judged_sentence(judged), *influence_sentences(judged)]
-        held_out = evidence.parts.held_out
-        short = shortfall(
-            findings.rules, findings.threshold, 0 if held_out is None else held_out.n_episodes
-        )
-        remedy = remedy_text(short, evidence.parts.remaining.n_episodes)
+        short = shortfall(findings.rules, findings.threshold, evidence.held_out)
+        remedy = remedy_text(short, evidence.episodes)
         if remedy:
             sentences.insert(0, f"No rule reaches the minimum confidence: {remedy}.")
     verdicts_drawn: tuple[Verdict, ...] = ("reached", "open", "below") if judged is not None else ()

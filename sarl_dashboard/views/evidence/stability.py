@@ -13,6 +13,7 @@ from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.stability import SAME_RULE, Stability, rule_stability
 from sarl_core.progress import Progress
+from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.components.worked_out import worked_out
@@ -24,6 +25,8 @@ TABLE_ROWS = 12
 def show_stability(evidence: RuleSetEvidence) -> None:
     """How often each rule comes back."""
     mined = evidence.parts.mined
+    if say_steps_needed("how often a rule comes back", mined):
+        return
     if not evidence.rule_set.rules or mined.n_episodes < 2:
         st.info(
             "There is no rule to look for; lower a threshold."

@@ -40,7 +40,7 @@ def show_export(demonstrations: Demonstrations) -> None:
         more = " Or switch rounding off." if chosen.rounded and chosen.rule_set.rules else ""
         st.error(f"{in_full(str(error))}{more}", icon=":material/error:")
         return
-    show_rounding(prepared, len(everything))
+    show_rounding(prepared, everything)
     view = switch("View", "carry_view", [FILE, MATRIX])
     if view == MATRIX:
         show_matrix(prepared.rule_set, chosen.stem, demonstrations)

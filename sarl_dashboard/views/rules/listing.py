@@ -22,7 +22,7 @@ from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.lists.rule_search import have_word, names_have_word
 from sarl_dashboard.components.settings import search_box
 from sarl_dashboard.components.tables import frame
-from sarl_dashboard.state.data import data_parts, held_out_demonstrations
+from sarl_dashboard.state.mined import episodes_tried_on, tried_on
 from sarl_dashboard.text import in_full
 from sarl_dashboard.views.rules.in_force import InForce
 
@@ -109,7 +109,7 @@ def matching(listed: Listed, in_force: InForce) -> Places:
             width=220,
             label_visibility="collapsed",
         )
-        tried = compact is None and held_out_demonstrations() is not None
+        tried = compact is None and tried_on() is not None
         least = lower_bound_choice() if tried else 0.0
         matches = listed.lower >= least
         sure = int(np.count_nonzero(matches))
@@ -182,9 +182,7 @@ def lower_bound_choice() -> float:
 
 def why_left_out(rule_set: RuleSet, least: float) -> None:
     """Why rules do not reach the lower bound, and where none does, what to do."""
-    parts = data_parts()
-    assert parts is not None
-    assert parts.held_out is not None
-    missing = shortfall(rule_set.rules, least, parts.held_out.n_episodes)
-    remedy = remedy_text(missing, parts.remaining.n_episodes)
+    held_out, all_of_them = episodes_tried_on()
+    missing = shortfall(rule_set.rules, least, held_out)
+    remedy = remedy_text(missing, all_of_them)
     st.caption(f"{shortfall_text(missing)}." + (f" {in_full(remedy)}" if remedy else ""))

@@ -27,6 +27,7 @@ from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components import tree_picture
+from sarl_dashboard.components.journey.steps_needed import say_of_sample
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.views.rules.in_force import InForce, TreePlace
 
@@ -49,7 +50,13 @@ def show_rule(rule: Rule, in_force: InForce, buttons: Callable[[], None]) -> Non
             show_origin(compact.as_shipped(rule), compact.shipped)
         if not rule.enabled:
             st.markdown(":orange[:material/block: Switched off: a shield does not use this rule.]")
-        if not rule.samples:
+        if not rule.samples and in_force.demonstrations.sample_of is not None:
+            st.info(
+                "Not counted: only a sample of the steps is here. The page Edit says what the rule "
+                "decides of it.",
+                icon=":material/data_usage:",
+            )
+        elif not rule.samples:
             st.info(
                 "No demonstrated state reaches this rule. It is for states that the expert never "
                 "came into by itself and was asked about.",
@@ -80,6 +87,7 @@ def show_rule(rule: Rule, in_force: InForce, buttons: Callable[[], None]) -> Non
     with right:
         st.html(heading("Its place in the tree"))
         tree_picture.show_tree(path_of(place, in_force), around="Around this rule", widget="tree")
+    say_of_sample("The histograms and example states below", in_force.demonstrations)
     st.html(features_of(place.tree, rule, in_force.demonstrations))
 
 

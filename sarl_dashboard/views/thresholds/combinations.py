@@ -17,8 +17,8 @@ _FEATURES = "_combined_features"
 def combinations_choice() -> None:
     """The switch; where it is on, the features that may be combined, and what came of it."""
     observed, parts = uncombined_parts(), data_parts()
-    if observed is None or parts is None:
-        return
+    if observed is None or parts is None or observed.mined.sample_of is not None:
+        return  # combinations are among the features of a mined file, or its trees know of none
     choice = combining.chosen()
     # The widgets follow the URL, so a link and the browser's "back" both reach them.
     st.session_state["_combinations"] = choice.on

@@ -30,7 +30,14 @@ from sarl_dashboard.state.rule_files import (
     FEWEST,
     compact_sets,
 )
-from sarl_dashboard.state.thresholds import MAX_DIVIDER, MIN_DIVIDER, chosen_thresholds
+from sarl_dashboard.state.thresholds import (
+    MAX_DIVIDER,
+    MIN_DIVIDER,
+    chosen_thresholds,
+    from_least,
+    least_support,
+    settled,
+)
 from sarl_dashboard.state.url import stay_beside
 from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.largest_rules import show_largest
@@ -45,6 +52,8 @@ from sarl_dashboard.views.thresholds.moves import (
 from sarl_dashboard.views.thresholds.numbers import show_numbers
 from sarl_dashboard.views.thresholds.recommendation import show_recommendation
 
+_SETTLED = "That of these trees was settled when they were mined."
+_TOO_LOW = ". The trees of this file do not reach so far down; mine its steps again with less"
 _SHORT = {COMPACT: "Compact", COMBINED: "Two features", FEWEST: "Fewest"}
 
 
@@ -69,15 +78,18 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
     with left:
         st.select_slider(
             "Minimum support",
-            with_step(SUPPORT_STEPS, thresholds.support),
+            with_step(from_least(SUPPORT_STEPS), thresholds.support),
             key="support",
-            value=FILTERED.support,
+            value=max(FILTERED.support, least_support()),
             format_func=threshold_text,
             bind="query-params",
             on_change=moved,
             help=word_help("support", "Here: how much of it a rule must have at least."),
         )
-        jump_buttons("support", jumps.support_below, jumps.support_above)
+        below = jumps.support_below
+        if below is not None and below < least_support():
+            below = None
+        jump_buttons("support", below, jumps.support_above)
     with middle:
         st.select_slider(
             "Minimum confidence",
@@ -91,7 +103,9 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
         )
         jump_buttons("confidence", jumps.confidence_below, jumps.confidence_above)
     with right:
-        if display.is_divided:
+        if display.is_divided and settled() is not None:
+            st.metric("Divider", f"{display.trees[0].divider}", help=word_help("divider", _SETTLED))
+        elif display.is_divided:
             st.slider(
                 "Divider",
                 MIN_DIVIDER,
@@ -162,8 +176,10 @@ def named_settings(thresholds: Thresholds, compact: str | None) -> None:
                 on_click=use,
                 args=(setting,),
                 type="primary" if thresholds == setting and not compact else "secondary",
+                disabled=setting.support < least_support(),
                 help=f"The paper's setting: support {setting.support:g}, "
-                f"confidence {setting.confidence:g}",
+                f"confidence {setting.confidence:g}"
+                + (_TOO_LOW if setting.support < least_support() else ""),
             )
         for name in compact_sets():
             st.button(

@@ -10,6 +10,7 @@ import streamlit as st
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.figures.thresholds import Layer
 from sarl_core.explaining.words.growth import LEARNERS
+from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.growing.growth import EXACT_UP_TO
 from sarl_core.mining.growing.histogram import BINS
 from sarl_core.mining.rule_set import RuleSet
@@ -22,7 +23,14 @@ from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.compact_set import Compact
 from sarl_dashboard.state.mined import mined_landscape
-from sarl_dashboard.state.thresholds import MAX_DEPTH, MAX_LIFT, choose_learner, chosen_learner
+from sarl_dashboard.state.thresholds import (
+    MAX_DEPTH,
+    MAX_LIFT,
+    choose_learner,
+    chosen_learner,
+    from_least,
+    settled,
+)
 
 MAPS, SURFACES = "Maps", "3-D"
 FINE, PAPER = "Fine grid", "Paper's grid"
@@ -43,7 +51,7 @@ class Display:
     Attributes:
         trees: One an action dimension.
         compact: The compact rules where they are in force; None for thresholds.
-        held_out: The episodes held out; None where there are none.
+        held_out: The episodes held out, or the file that counted them; None where there are none.
         dimension: Which action dimension is looked at; None for all.
         layers: What the two figures show.
         surfaces: Whether as the paper's surfaces, and not as maps.
@@ -52,7 +60,7 @@ class Display:
 
     trees: tuple[PolicyTree, ...]
     compact: Compact | None
-    held_out: Demonstrations | None
+    held_out: Demonstrations | MinedData | None
     dimension: int | None
     layers: tuple[Layer, Layer]
     surfaces: bool
@@ -72,7 +80,7 @@ class Display:
         supports, confidences = FINE_SUPPORTS, FINE_CONFIDENCES
         if self.paper_grid:
             supports, confidences = tuple(PAPER_SUPPORTS), tuple(PAPER_CONFIDENCES)
-        return self._part(supports, confidences, thresholds)
+        return self._part(from_least(supports), confidences, thresholds)
 
     def point(self, thresholds: Thresholds) -> Landscape:
         """The numbers in force, in the shape of a landscape of one point.
@@ -114,14 +122,16 @@ def _compact_point(rules: RuleSet, dimension: int | None) -> Landscape:
 
 
 def chosen_display(
-    trees: tuple[PolicyTree, ...], compact: Compact | None, held_out: Demonstrations | None
+    trees: tuple[PolicyTree, ...],
+    compact: Compact | None,
+    held_out: Demonstrations | MinedData | None,
 ) -> Display:
     """The choices above the figures.
 
     Args:
         trees: One an action dimension.
         compact: The compact rules where they are in force.
-        held_out: The episodes held out; None where there are none.
+        held_out: The episodes held out, or the file that counted them; None where there are none.
     """
     with st.container(horizontal=True, gap="medium", vertical_alignment="center", key="ways"):
         pairs = [SIZE, QUALITY] if held_out is None else list(LAYERS)
@@ -164,6 +174,9 @@ def more() -> None:
             on_change=rule_base.choose,
             help=with_words("Most conditions of a rule. 0: no limit."),
         )
+        if settled() is not None:
+            st.caption("What grew the trees was settled when these steps were mined.")
+            return
         st.session_state["_learner_choice"] = chosen_learner()
         st.selectbox(
             "Learner",

@@ -21,6 +21,7 @@ from sarl_core.mining.quantisation import (
 from sarl_core.studies.divider import snapped_agents
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
+from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.run_bar import episodes_bar, watched
 from sarl_dashboard.jobs.episodes import EpisodeBatch, Row, known, take_up_work
@@ -49,6 +50,8 @@ def show_divider(demonstrations: Demonstrations, dimension: int | None) -> None:
         demonstrations: With continuous actions.
         dimension: Which action dimension is looked at; None for all.
     """
+    if say_steps_needed("trying other dividers", demonstrations):
+        return
     divided = _quantised(demonstrations)
     some = divided if dimension is None else (divided[dimension],)
     dark = is_dark()

@@ -8,7 +8,7 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.steps import neat_point
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.state import rule_base
-from sarl_dashboard.state.thresholds import choose_thresholds, chosen_limits
+from sarl_dashboard.state.thresholds import choose_thresholds, chosen_limits, least_support
 from sarl_dashboard.views.thresholds.display import SURFACES, TRADE_OFFS
 
 
@@ -76,7 +76,8 @@ def take_click(key: str, trees: tuple[PolicyTree, ...]) -> None:
         clicked = Thresholds(float(values[0]), float(values[1]), *chosen_limits())
         if key == "pareto":
             clicked = neat_point(trees, clicked)
-        st.session_state["_clicked"] = (clicked.support, clicked.confidence)
+        support = max(clicked.support, least_support())
+        st.session_state["_clicked"] = (support, clicked.confidence)
     support, confidence = st.session_state.get("_clicked", (None, None))
     if support is not None:
         move(support=support, confidence=confidence)

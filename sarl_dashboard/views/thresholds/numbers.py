@@ -9,11 +9,12 @@ import streamlit as st
 from sarl_core.explaining.words.cross_fit import elsewhere_text
 from sarl_core.explaining.words.growth import LEARNERS, learner_text
 from sarl_core.mining.evidence import HeldOut
-from sarl_core.mining.language import share_text
+from sarl_core.mining.language import share_text, threshold_text
 from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_dashboard.components.journey.words import with_words, word_help
+from sarl_dashboard.state.thresholds import least_support
 
 _ELSEWHERE = "Elsewhere: in an episode that the rules were not mined from, on average."
 
@@ -61,6 +62,11 @@ def show_numbers(point: Landscape, judged: Judged | None, tree: PolicyTree | Non
                 width="content",
                 help=with_words(f"{learner_text(tree.learner).capitalize()}."),
             )
+    if least_support():
+        st.caption(
+            f":material/info: The trees of this file reach down to a support of "
+            f"{threshold_text(least_support())}; rules of fewer states are not among them."
+        )
 
 
 def elsewhere(share: HeldOut | None) -> dict[str, Any]:
