@@ -48,11 +48,12 @@ if not evidence.rule_set.rules:
     st.page_link("thresholds.py", label="Go to Thresholds", icon=":material/arrow_forward:")
 else:
     show_overview(evidence)
-    elsewhere_notice(
-        evidence.thresholds,
-        evidence.rule_set.fidelity,
-        lambda judged: Markup().join(map(note, influence_sentences(judged))),
-    )
+    if not (evidence.mined and evidence.held_out):  # what these episodes say stands above
+        elsewhere_notice(
+            evidence.thresholds,
+            evidence.rule_set.fidelity,
+            lambda judged: Markup().join(map(note, influence_sentences(judged))),
+        )
 enough, curve, stability, contradictions, left_out = st.tabs(
     [
         "Enough demonstrations?",

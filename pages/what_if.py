@@ -5,6 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.shielding.projection import Projection
+from sarl_dashboard.components.journey.steps_needed import say_of_sample
 from sarl_dashboard.components.settings import (
     no_boxes_notice,
     outside_choice,
@@ -39,6 +40,7 @@ with st.container(horizontal=True, vertical_alignment="bottom", gap="small"):
     if rules.rule_set.actions[0].is_interval:
         projection = projection_choice(220)
 no_boxes_notice([rules.rule_set], outside)
+say_of_sample("The ranges and medians of features", demonstrations)
 situation = situation_of(demonstrations, rules, projection, outside)
 fit_sliders(situation)
 question_and_answer(situation)

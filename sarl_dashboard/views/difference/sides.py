@@ -16,7 +16,7 @@ from sarl_dashboard.state import in_force, rule_base
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_choice import BETWEEN, rules_for
 from sarl_dashboard.state.rule_files import EDITED, IN_FORCE, UNEDITED
-from sarl_dashboard.state.thresholds import chosen_thresholds
+from sarl_dashboard.state.thresholds import chosen_thresholds, least_support
 from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import in_full
 
@@ -90,7 +90,7 @@ def _usual() -> str:
     """What the rules in force are held against first; of many states there are too many rules."""
     demonstrations = chosen_demonstrations()
     many = demonstrations is not None and demonstrations.whole.steps > EXACT_UP_TO
-    if not many:
+    if not many and not least_support():
         return "unfiltered"
     return "" if chosen_thresholds() == FILTERED else "filtered"
 
