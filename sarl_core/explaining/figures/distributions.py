@@ -109,11 +109,18 @@ def counted_feature_rows(mined: MinedData) -> tuple[FeatureRow, ...]:
         mined: Over N pairs.
 
     Returns:
-        d rows; the median is the nearest border between bins.
+        d rows; the median is the nearest border between bins, and the least value where there is
+        one bin.
     """
     box = mined.boxes[0][:, 0]  # of the root
     return tuple(
-        FeatureRow(feature.name, feature.unit, float(low), histogram.quantile(0.5), float(high))
+        FeatureRow(
+            feature.name,
+            feature.unit,
+            float(low),
+            histogram.quantile(0.5) if len(histogram.borders) else float(low),
+            float(high),
+        )
         for feature, histogram, low, high in zip(
             mined.sample.features, mined.histograms, box[0], box[3], strict=True
         )
