@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Thread, current_thread
@@ -11,6 +12,15 @@ import pytest
 
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.state import library as state
+from tests.app.mined_file import MinedFiles, mined_files
+
+
+@pytest.fixture(autouse=True)
+def own_main() -> Iterator[None]:
+    """A page that ran passes for the program, and processes that start later would run it."""
+    main = sys.modules["__main__"]
+    yield
+    sys.modules["__main__"] = main
 
 
 @pytest.fixture(autouse=True)
@@ -33,3 +43,9 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     for opened in state._OPENED.values():
         opened.close()
     state._OPENED.clear()
+
+
+@pytest.fixture(scope="session")
+def mined(tmp_path_factory: pytest.TempPathFactory) -> MinedFiles:
+    """What a cluster leaves of steps that are not here."""
+    return mined_files(tmp_path_factory.mktemp("mined"))

@@ -225,8 +225,8 @@ def _evidence(
     if not (tally.same or tally.split) or rule.origin != "mined":
         here = tally.by_episode[index]
         decided = "that it decides " if here.samples != applying else ""
-        shown = "the sample" if tally.sampled else "this report's demonstrations"
-        evidence.append(_tried(f"{decided}of {shown}", here, threshold))
+        states = "the sample" if tally.sampled else "this report's demonstrations"
+        evidence.append(_tried(f"{decided}of {states}", here, threshold))
     return tuple(evidence)
 
 

@@ -1,0 +1,128 @@
+"""A sample that a cluster leaves never passes for the steps it is of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sarl_core import Demonstrations, InputError, grow_policy_trees
+from sarl_core.demonstrations.names import names_of, renamed
+from sarl_core.explaining.figures.distributions import counted_feature_rows, label_histogram
+from sarl_core.explaining.report.report import make_report
+from sarl_core.mining.combining.choice import with_combinations
+from sarl_core.mining.distributed import mining
+from sarl_core.mining.distributed.mined_data import MinedData
+from sarl_core.mining.editing.regrowing import next_queries
+from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.thresholds.pareto import pareto_front
+from sarl_core.mining.tree import Source
+from sarl_core.mining.validation.contradictions import find_contradictions
+from sarl_core.mining.validation.cross_fitting import cross_fit, judge
+from sarl_core.mining.validation.holding_out import hold_out
+from tests.mining.distributed.conftest import Mine, cut
+
+LEAST = 0.005
+
+
+@pytest.fixture
+def mined(
+    fleet: Demonstrations, tmp_path: Path, mine: Mine, monkeypatch: pytest.MonkeyPatch
+) -> MinedData:
+    monkeypatch.setattr(mining, "HELD_ROWS", 500)
+    return mine(cut(fleet, tmp_path / "parts", 2), hold_out=0.2, min_support=LEAST)
+
+
+def test_a_sample_knows_what_it_is_of(mined: MinedData) -> None:
+    sample = mined.sample
+    assert len(sample) == 500
+    assert (sample.whole.steps, sample.whole.episodes) == (4_800, 48)
+    assert replace(sample, sample_of=None).digest != sample.digest
+    assert Source.of(sample) == mined.trees[0].source
+    names = names_of(sample)
+    other = renamed(sample, names._replace(features=("lean", *names.features[1:])))
+    again = mined.renamed(other)
+    assert again.trees[0].source.features[0].name == "lean"
+    assert again.trees[0].source.digest == sample.whole.digest
+    assert (again.trees[0].counts == mined.trees[0].counts).all()
+    assert mined.renamed(sample).trees == mined.trees
+
+
+@pytest.mark.parametrize(
+    ("work", "what"),
+    [
+        (grow_policy_trees, "growing trees"),
+        (cross_fit, "judging rules in other episodes"),
+        (find_contradictions, "looking for contradictions"),
+        (with_combinations, "choosing combinations"),
+        (lambda sample: hold_out(sample, 0.2), "holding out other episodes"),
+    ],
+)
+def test_what_would_pass_for_the_whole_is_refused(
+    mined: MinedData, work: Callable[[Demonstrations], object], what: str
+) -> None:
+    sentence = f"{what} needs the demonstrations themselves, .* 4,800 steps .* sample of 500;"
+    with pytest.raises(InputError, match=sentence):
+        work(mined.sample)
+
+
+def test_no_part_of_its_trees_is_regrown(mined: MinedData) -> None:
+    with pytest.raises(InputError, match="regrowing a part of the tree needs the demonstrations"):
+        next_queries(mined.trees[0], 0, mined.sample)
+
+
+def test_all_rules_are_judged_as_each_is_counted(mined: MinedData) -> None:
+    for thresholds in (Thresholds(0.01, 0.8), Thresholds(LEAST, 0.95, 1.2, 4)):
+        rules = mined.mine(
+            supp_min=thresholds.support,
+            conf_min=thresholds.confidence,
+            lift_min=thresholds.lift,
+            max_depth=thresholds.max_depth,
+        )
+        judged, counted = mined.judged(thresholds), judge(rules, mined.count_rules(rules))
+        assert judged is not None
+        assert judged.fidelity == counted.fidelity
+        assert judged.coverage == counted.coverage
+    assert replace(mined, held_out=()).judged(Thresholds(0.01, 0.8)) is None
+
+
+def test_no_trade_off_is_promised_below_what_was_grown(mined: MinedData) -> None:
+    assert mined.min_support == LEAST
+    front = pareto_front(mined.trees)
+    assert min(point.support for point in front) >= LEAST
+    unknown = tuple(replace(tree, least_support=0.0) for tree in mined.trees)
+    assert min(point.support for point in pareto_front(unknown)) < LEAST
+
+
+def test_grown_trees_know_how_far_down_they_go(fleet: Demonstrations) -> None:
+    (tree,) = grow_policy_trees(fleet, min_support=0.01)
+    assert tree.least_support == 0.01
+    assert grow_policy_trees(fleet)[0].least_support == 0.0
+
+
+def test_numbers_of_features_and_actions_are_of_all_steps(
+    mined: MinedData, fleet: Demonstrations
+) -> None:
+    held = mined.held_out[0].numbers
+    rest = fleet.select(np.setdiff1d(fleet.episodes, held))
+    for index, row in enumerate(counted_feature_rows(mined)):
+        values = rest.observations[:, index]
+        assert (row.low, row.high) == (values.min(), values.max())
+        assert abs(float((values <= row.median).mean()) - 0.5) < 0.2
+    tree = mined.trees[0]
+    drawn = label_histogram(tree.counts[0], tree.dimension)
+    assert drawn.counts.sum(axis=1).tolist() == np.bincount(rest.actions).tolist()
+
+
+def test_a_report_counts_rules_on_all_steps(mined: MinedData) -> None:
+    rules = mined.mine(supp_min=0.02, conf_min=0.8)
+    text = make_report(rules, mined.sample, trees=mined.trees, frames=0).html
+    assert "4,800 steps in 48 episodes" in text
+    assert "a sample of 500 of 4,800 steps" in text
+    assert mined.sample.whole.digest in text
+    assert all(f"{rule.samples:,} states)" in text for rule in rules)
+    assert "sampled states" in text
+    assert "did something else" not in text  # nobody looked for contradictions in a sample
