@@ -21,7 +21,12 @@ _MOST = 0.95  # of a bar that only knows how long such work usually takes
 
 def is_long(demonstrations: Demonstrations) -> bool:
     """Whether growing the trees of demonstrations takes more than a moment."""
-    return demonstrations.sample_of is None and len(demonstrations) > EXACT_UP_TO
+    return demonstrations.sample_of is None and are_many(demonstrations)
+
+
+def are_many(demonstrations: Demonstrations) -> bool:
+    """Whether there are so many steps, here or elsewhere, that unfiltered rules are too many."""
+    return demonstrations.whole.steps > EXACT_UP_TO
 
 
 def key_of(demonstrations: Demonstrations, divider: int) -> tuple[object, ...]:

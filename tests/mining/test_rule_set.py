@@ -194,6 +194,8 @@ def test_whatever_changes_in_a_tree_changes_its_digest(
         "divider": 3,
         "source": replace(tree.source, digest="x"),
         "learner": "histogram",
+        "sample_place": np.arange(len(tree.sample_order)),
+        "least_support": 0.5,
     }.get(name)
     if changed is None:
         changed = value.copy()

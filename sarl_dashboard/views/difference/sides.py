@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import streamlit as st
 
 from sarl_core.errors import SarlError
-from sarl_core.mining.growing.growth import EXACT_UP_TO
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import FILTERED
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import RULE_SETS, offered_rule_sets, rule_sets_help
+from sarl_dashboard.jobs import growing
 from sarl_dashboard.state import in_force, rule_base
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_choice import BETWEEN, rules_for
@@ -89,7 +89,7 @@ def _named() -> list[str]:
 def _usual() -> str:
     """What the rules in force are held against first; of many states there are too many rules."""
     demonstrations = chosen_demonstrations()
-    many = demonstrations is not None and demonstrations.whole.steps > EXACT_UP_TO
+    many = demonstrations is not None and growing.are_many(demonstrations)
     if not many and not least_support():
         return "unfiltered"
     return "" if chosen_thresholds() == FILTERED else "filtered"
