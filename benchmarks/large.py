@@ -82,7 +82,7 @@ def mining(quick: bool) -> Iterable[Row]:
             repeats=1 if quick else 3,
         )
         (tree,) = _grown(demonstrations)
-        right = tree.label[_pruned(tree)[tree.apply(fresh.observations)]] == fresh.actions
+        right = tree.label[pruned(tree)[tree.apply(fresh.observations)]] == fresh.actions
         other = exact.predict(fresh.observations) == fresh.actions
         lost = float(other.mean() - right.mean())
         yield Row(
@@ -144,7 +144,7 @@ def _mined(demonstrations: Demonstrations) -> RuleSet:
     return mine_rules(_grown(demonstrations), supp_min=SMALLEST, conf_min=0.9)
 
 
-def _pruned(tree: PolicyTree) -> NDArray[np.int64]:
+def pruned(tree: PolicyTree) -> NDArray[np.int64]:
     """For each node the lowest one on its path that has the smallest support."""
     stands = np.arange(tree.n_nodes)
     for node in np.argsort(tree.depth, kind="stable"):

@@ -33,7 +33,8 @@ from sarl_core.mining.tree import LEAF
 
 PART_ROWS = 100_000
 """A node with no more rows is grown to its end in one process."""
-_COUNTS = 4_000_000  # numbers that a piece counts at once: 32 MB
+COUNTS = 4_000_000
+"""Numbers that a piece counts at once: 32 MB."""
 _GROUP_ROWS = 400_000  # rows of the nodes that one process grows at once
 _WAVE_ROWS = 4_000_000  # rows that are brought together at once
 _TOGETHER = 8  # arrays that are added up at once
@@ -128,7 +129,7 @@ class DistributedGrowth:
     def _chosen(self, nodes: Sequence[int], at: Sequence[Any]) -> Queries:
         """Choose the queries of some nodes, and make their children."""
         labels, bins = len(self.counts), max(self.bins)
-        together = max(1, _COUNTS // (len(self.bins) * bins * labels))
+        together = max(1, COUNTS // (len(self.bins) * bins * labels))
         chosen: list[Query | None] = []
         for start in range(0, len(nodes), together):
             wanted = np.array(nodes[start : start + together], dtype=np.int64)
