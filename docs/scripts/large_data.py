@@ -30,6 +30,7 @@ from benchmarks.large import FEATURES, LABELS, pairs, write_files
 from docs.scripts.large_methods import METHODS, PREDICTING, SECONDS, SMALLEST, peak_memory
 from docs.scripts.large_page import JSON, ROOT, draw, write_page
 from sarl_core.clusters import cluster
+from sarl_core.errors import WorkError
 from sarl_core.files import whole_file
 from sarl_core.mining.distributed.mining import ClusterPlan, mine_on_cluster
 from sarl_core.mining.distributed.pieces import Reading, parquet_paths, pieces_of
@@ -92,13 +93,13 @@ def measured(python: str, method: str, folder: Path) -> Outcome:
         text=True,
         check=False,
     )
-    if done.stdout:
-        outcome: Outcome = json.loads(done.stdout.splitlines()[-1])
+    outcome: Outcome = json.loads(done.stdout.splitlines()[-1]) if done.stdout else {}
+    if "seconds" in outcome or "note" in outcome:
         return outcome
     if done.returncode == -signal.SIGALRM:
-        return {"note": f"no answer in {SECONDS} s"}
+        return outcome | {"note": f"no answer in {SECONDS} s"}
     why = done.stderr.strip().splitlines()[-1:]
-    return {"note": "failed", "why": (why or [f"signal {-done.returncode}"])[0]}
+    return outcome | {"note": "failed", "why": (why or [f"signal {-done.returncode}"])[0]}
 
 
 def measure_methods(
@@ -114,7 +115,7 @@ def measure_methods(
                     continue
                 outcome = given_up.get(method) or measured(python, method, folder)
                 if "note" in outcome:
-                    given_up[method] = {"note": "not tried, for that reason"}
+                    given_up[method] = outcome | {"note": "not tried, for that reason"}
                 results.add(part, method, rows, outcome)
 
 
@@ -126,7 +127,11 @@ def measure_cluster(results: Results, sizes: tuple[int, ...]) -> None:
             write_files(few, 4_000, files=2)
             write_files(many, rows, files=max(2, min(16, rows // 50_000)))
             for workers in WORKERS:
-                results.add("scaling", f"cluster_{workers}", rows, on_cluster(few, many, workers))
+                try:
+                    outcome = on_cluster(few, many, workers)
+                except WorkError as error:  # as of a worker that had too little memory
+                    outcome = {"note": "failed", "why": str(error)}
+                results.add("scaling", f"cluster_{workers}", rows, outcome)
 
 
 def on_cluster(few: Path, many: Path, workers: int) -> Outcome:

@@ -2,8 +2,8 @@
 
 ``python -m docs.scripts.large_methods METHOD FOLDER`` reads states and labels from the folder
 (``seen_states.npy``, ``seen_labels.npy``, and ``fresh_…`` to predict) and prints what came out as
-JSON, a line after the rules are there and one after the prediction. It imports what the method
-needs and nothing else, so that it runs in an interpreter that has the method alone.
+JSON: a line before the work, one after the rules are there and one after the prediction. It imports
+what the method needs and nothing else, so that it runs in an interpreter that has the method alone.
 """
 
 from __future__ import annotations
@@ -201,6 +201,7 @@ def run(method: Method, folder: Path) -> None:
     except (ImportError, metadata.PackageNotFoundError) as error:
         say({"note": "not installed", "why": str(error)})
         return
+    say(outcome)
     states, labels = (np.load(folder / f"seen_{name}.npy") for name in ("states", "labels"))
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     signal.alarm(SECONDS)  # it ends the process, whatever that is doing

@@ -104,10 +104,11 @@ def peers_table(peers: Outcomes) -> str:
 def plan_table(scaling: Outcomes) -> str:
     """What a billion rows would take on a hundred workers, by what a worker's share took."""
     measured = scaling.get("cluster_1", {})
-    if not measured:
+    times = _times(measured)
+    if not times:
         return "Nothing is measured yet."
-    size = max(measured, key=int)
-    one, rows = measured[size], int(size)
+    rows = max(times)
+    one = measured[str(rows)]
     pieces = MANY_ROWS // PIECE_ROWS
     a_node = FEATURES * BINS * LABELS * 8
     nodes = sum(one["splits"])
@@ -285,10 +286,15 @@ def _circumstances(outcomes: Outcomes) -> str:
     every = [one for several in outcomes.values() for one in several.values()]
     if not every:
         return "Nothing is measured yet."
-    last, loads = every[-1], [one["load_before"] for one in every]
+    last, load = every[-1], max(one["load_before"] for one in every)
+    machine = (
+        f"{last['cores']} cores, {last['machine_memory'] / 1e9:.0f} GB, Python {last['python']}."
+    )
+    if load < 1:
+        return machine
     return (
-        f"{last['cores']} cores, {last['machine_memory'] / 1e9:.0f} GB, Python {last['python']}; "
-        f"the machine's load before it began: {min(loads):.1f} to {max(loads):.1f}."
+        f"{machine} The machine did other work meanwhile (a load of {load:.1f} before this began), "
+        "so that these times are longer than they need be, and differ by chance."
     )
 
 
