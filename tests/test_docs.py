@@ -15,7 +15,7 @@ from typing import NamedTuple
 import pytest
 
 import sarl_core
-from docs.scripts import compact_table
+from docs.scripts import compact_table, large_page
 from sarl_core import load_demonstrations, mine_rules, with_combinations
 
 from .examples import ROOT, run
@@ -127,6 +127,11 @@ def test_the_table_of_the_compact_sets_is_that_of_what_was_measured():
     assert compact_table.with_rules(page) == page
     readme = compact_table.README.read_text(encoding="utf-8")
     assert compact_table.with_table(readme) == readme
+
+
+def test_the_tables_of_large_data_are_those_of_what_was_measured():
+    page = large_page.PAGE.read_text(encoding="utf-8")
+    assert large_page.with_tables(page, json.loads(large_page.JSON.read_text())) == page
 
 
 def test_the_guide_is_built_and_every_link_leads_somewhere(tmp_path):
