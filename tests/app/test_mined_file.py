@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
@@ -17,6 +18,7 @@ from sarl_core.mining.growing import growth
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
+from sarl_dashboard.views.rules.rule import features_of
 from tests.app.mined_file import (
     EPISODES,
     HELD_OUT,
@@ -29,7 +31,6 @@ from tests.app.mined_file import (
 )
 from tests.app.screens import errors, finished, html, metrics, open_page, texts
 
-pytestmark = pytest.mark.usefixtures("place")
 AT = Thresholds(0.005, 0.9)
 NEEDED = "needs the demonstrations themselves"
 PART = f"a sample of {SAMPLE:,} of {STEPS:,} steps"
@@ -272,3 +273,11 @@ def test_a_report_is_made_of_it(mined: MinedFiles) -> None:
     assert share_text(rules.coverage) in report
     assert f"{max(rule.samples for rule in rules):,} states)" in report
     assert mined.data.sample.whole.digest in report
+
+
+def test_a_rule_of_which_no_state_is_here_says_so(mined: MinedFiles) -> None:
+    rules, (tree,) = rules_at(mined), mined.data.trees
+    none = np.zeros(0, dtype=np.int64)
+    bare = replace(tree, sample_order=none, sample_place=none)
+    assert "None of its states is in the sample" in features_of(bare, rules[0], mined.data.sample)
+    assert "Example states" in features_of(tree, rules[0], mined.data.sample)

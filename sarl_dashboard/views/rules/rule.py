@@ -23,7 +23,7 @@ from sarl_core.explaining.html.rule_features import features_html
 from sarl_core.explaining.tables.rule_evidence import feature_evidence, path_steps
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.rules import Rule
+from sarl_core.mining.rules import Rule, node_of
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components import tree_picture
@@ -143,7 +143,10 @@ def features_of(tree: PolicyTree, rule: Rule, demonstrations: Demonstrations) ->
         if planes:
             drawn = combinations_html(planes, features, tree.dimension)
             parts.append(heading("What it asks of two features together") + drawn)
-    if rule.samples:
+    node = tree.place_of(node_of(rule))
+    if node is not None and rule.samples and not len(tree.rows(node)):
+        parts.append(heading("None of its states is in the sample"))
+    elif rule.samples:
         title = "Example states" if rule.samples > 1 else "The one state it applies to"
         parts.append(heading(title) + examples_html(demonstrations, tree, rule))
     return Markup().join(parts)
