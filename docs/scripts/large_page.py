@@ -14,7 +14,7 @@ from benchmarks.large import FEATURES, LABELS
 from benchmarks.measure import duration
 from docs.scripts.large_methods import METHODS
 from sarl_core.explaining.colours import LABEL_COLOURS
-from sarl_core.explaining.figures.png import figure_to_png
+from sarl_core.explaining.figures.png import figure_to_png, sheet
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.files import whole_file
 from sarl_core.mining.distributed.growth import COUNTS
@@ -146,7 +146,7 @@ def plan_table(scaling: Outcomes) -> str:
         ),
         (
             "seconds of a core for these histograms",
-            f"{_counting(one, rows) * 1e6:.2f} a million rows and level",
+            f"{_counting(one, rows) * 1e6:.2f} a million rows and level" if counting else "–",
             f"{duration(counting)} on each worker" if counting else "not measured",
         ),
         ("sample that the client has", "", _bytes(SAMPLE_ROWS * 4 * (FEATURES + 1))),
@@ -177,7 +177,7 @@ def _counting(one: Outcome, rows: int) -> float:
 def draw(parts: Mapping[str, Outcomes]) -> None:
     """Write the picture."""
     with whole_file(PICTURE) as unfinished:
-        unfinished.write_bytes(figure_to_png(scaling_figure(parts.get("scaling", {}))))
+        unfinished.write_bytes(sheet([[figure_to_png(scaling_figure(parts.get("scaling", {})))]]))
 
 
 def scaling_figure(scaling: Outcomes) -> go.Figure:
