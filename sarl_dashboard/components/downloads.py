@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +12,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import save_demonstrations
+from sarl_core.demonstrations.samples import sample_text
 
 MIMES = {
     ".c": "text/x-c",
@@ -103,7 +104,10 @@ def download(
 
 
 def as_file(demonstrations: Demonstrations, extension: str = ".parquet") -> bytes:
-    """Demonstrations as a file's bytes."""
+    """Demonstrations as a file's bytes; those of a sample say in the file what they are."""
+    if demonstrations.sample_of is not None:
+        said = f"these are {sample_text(demonstrations)}"
+        demonstrations = replace(demonstrations, notes=(*demonstrations.notes, said))
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"demonstrations{extension}"
         save_demonstrations(demonstrations, path)

@@ -94,5 +94,5 @@ def demonstrated(env_id: EnvironmentOrId, seed: int, episodes: int) -> bool:
         and demonstrations.seed is not None
         and demonstrations.env_id == str(env_id)
         and demonstrations.seed < seed + episodes
-        and seed < demonstrations.seed + demonstrations.n_episodes
+        and seed < demonstrations.seed + demonstrations.whole.episodes
     )

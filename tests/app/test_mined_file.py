@@ -10,6 +10,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from sarl_core.demonstrations.formats import read_demonstrations
 from sarl_core.library import Library
 from sarl_core.library.bundles import export_bundle, import_bundle
 from sarl_core.library.contents import data_of, rules_of
@@ -18,6 +19,7 @@ from sarl_core.mining.growing import growth
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
+from sarl_dashboard.components.downloads import as_file
 from sarl_dashboard.views.rules.rule import features_of
 from tests.app.mined_file import (
     EPISODES,
@@ -273,6 +275,12 @@ def test_a_report_is_made_of_it(mined: MinedFiles) -> None:
     assert share_text(rules.coverage) in report
     assert f"{max(rule.samples for rule in rules):,} states)" in report
     assert mined.data.sample.whole.digest in report
+
+
+def test_a_downloaded_sample_says_that_it_is_one(mined: MinedFiles) -> None:
+    again = read_demonstrations(as_file(mined.data.sample), "sample.parquet")
+    assert len(again) == SAMPLE
+    assert f"these are {PART}" in again.notes
 
 
 def test_a_rule_of_which_no_state_is_here_says_so(mined: MinedFiles) -> None:
