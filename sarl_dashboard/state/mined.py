@@ -5,6 +5,7 @@ from __future__ import annotations
 from operator import attrgetter
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError
 from sarl_core.explaining.tables.rules import TopRules, top_rules
 from sarl_core.mining.algorithm_1 import mine_rules
@@ -60,9 +61,14 @@ def grown_trees(
 
     Returns:
         Shared between sessions (they are immutable).
+
+    Raises:
+        InputError: If a mined file has another divider.
     """
     mined = mined_data()
     if mined is not None and demonstrations.sample_of is not None:
+        if not (demonstrations.is_discrete or divider == mined.divider):
+            require_every_step(demonstrations, f"mining at divider {divider}")
         return mined.trees
     return _grown(*growing_of(demonstrations, divider, learner))
 

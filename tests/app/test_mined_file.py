@@ -10,6 +10,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
+from sarl_core import load_demonstrations, mine_rules
 from sarl_core.demonstrations.formats import read_demonstrations
 from sarl_core.library import Library
 from sarl_core.library.bundles import export_bundle, import_bundle
@@ -17,11 +18,12 @@ from sarl_core.library.contents import data_of, rules_of
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.growing import growth
 from sarl_core.mining.language import share_text
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rule_set import RuleSet, rules_to_json
 from sarl_core.mining.rules import Thresholds
 from sarl_dashboard.components.downloads import as_file
 from sarl_dashboard.views.rules.rule import features_of
 from tests.app.mined_file import (
+    DATA,
     EPISODES,
     HELD_OUT,
     LEAST,
@@ -31,7 +33,7 @@ from tests.app.mined_file import (
     opened_mined,
     upload_mined,
 )
-from tests.app.screens import errors, finished, html, metrics, open_page, texts
+from tests.app.screens import errors, finished, html, metrics, open_page, texts, upload_rules
 
 AT = Thresholds(0.005, 0.9)
 NEEDED = "needs the demonstrations themselves"
@@ -275,6 +277,15 @@ def test_a_report_is_made_of_it(mined: MinedFiles) -> None:
     assert share_text(rules.coverage) in report
     assert f"{max(rule.samples for rule in rules):,} states)" in report
     assert mined.data.sample.whole.digest in report
+
+
+def test_rules_of_another_divider_get_no_numbers_of_its_trees(mined: MinedFiles) -> None:
+    demonstrations = load_demonstrations(DATA / "pendulum.parquet").select(range(5))
+    rules = mine_rules(demonstrations, supp_min=0.01, conf_min=0.8, divider=3)
+    app = open_page("report", data=opened_mined(mined.pendulum))
+    upload_rules(app, "three.json", rules_to_json(rules).encode())
+    (error,) = errors(app)
+    assert error.startswith(f"Mining at divider 3 {NEEDED}")
 
 
 def test_a_downloaded_sample_says_that_it_is_one(mined: MinedFiles) -> None:
