@@ -7,6 +7,7 @@ as a fleet's recorder would.
 from __future__ import annotations
 
 import argparse
+import os
 import tempfile
 import time
 from collections.abc import Iterable
@@ -28,6 +29,7 @@ from sarl_core import (
     save_demonstrations,
 )
 from sarl_core.clusters import cluster
+from sarl_core.limits import READ_LIMIT
 from sarl_core.mining.distributed.mining import ClusterPlan, mine_on_cluster
 from sarl_core.mining.distributed.pieces import Reading, parquet_paths
 
@@ -108,6 +110,7 @@ def on_a_cluster(quick: bool) -> Iterable[Row]:
             mined = mine_on_cluster(client, paths, Reading(), plan)
             took = time.perf_counter() - started
             peak = max(client.run(_peak).values())
+        os.environ.setdefault(READ_LIMIT, "8")
         whole = load_demonstrations(paths)
     started = time.perf_counter()
     (tree,) = grow_policy_trees(whole, learner="histogram", min_support=SMALLEST)
@@ -163,11 +166,13 @@ def write_files(folder: Path, rows: int, *, files: int) -> None:
         files: How many.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    first = 0
     for number in range(files):
         start = rows * number // files
         part = rows * (number + 1) // files - start
         path = folder / f"part-{number:03d}.parquet"
-        save_demonstrations(pairs(part, seed=1_000 + number, first=start // STEPS), path)
+        save_demonstrations(pairs(part, seed=1_000 + number, first=first), path)
+        first += -(-part // STEPS)
 
 
 def main() -> None:
