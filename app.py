@@ -10,7 +10,9 @@ from __future__ import annotations
 import atexit
 import sys
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 
 import streamlit as st
 
@@ -25,5 +27,8 @@ atexit.register(_while_it_runs.close)
 # folder and finds no module.
 _PAGES = Path(__file__).parent / "pages"
 sys.path.append(str(_PAGES))
+
+# Importing what grows trees takes as long as a browser takes to begin.
+Thread(target=import_module, args=("sklearn.tree",), daemon=True).start()
 
 app = st.App(_PAGES / "_router.py")
