@@ -17,7 +17,7 @@ from sarl_core.shielding.shield import Shield
 FOLDER = Path(__file__).resolve().parents[2] / "data" / "rules"
 SHIPPED = {
     "cartpole_combined.json": ("CartPole-v1", 2, 500.0),
-    "cartpole_compact.json": ("CartPole-v1", 4, 500.0),
+    "cartpole_compact.json": ("CartPole-v1", 3, 500.0),
     "lunar_lander_combined.json": ("LunarLander-v3", 24, 265.0),
     "lunar_lander_few_combined.json": ("LunarLander-v3", 8, 240.0),
     "lunar_lander_compact.json": ("LunarLander-v3", 48, 200.0),
