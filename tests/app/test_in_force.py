@@ -180,9 +180,9 @@ def test_a_file_is_kept_and_its_link_opens_it_until_it_is_removed(tmp_path: Path
 def test_a_kept_version_is_in_force_and_edited_as_itself() -> None:
     kept = RuleSet.load(DATA.parent / "rules" / "cartpole_compact.json")
     with Library(place_of()) as library:
-        item = add_rules(library, kept, "the four", author=usual_author())
+        item = add_rules(library, kept, "the three", author=usual_author())
     app = open_page("edit", data="cartpole", set=item.id)
-    assert "The rules of the four, 4 of them" in texts(app)
+    assert "The rules of the three, 3 of them" in texts(app)
     click(app, "edit_switch")
     assert chosen_rules(app) == f"{item.id} with edits"
     app.switch_page("rules.py").run()
