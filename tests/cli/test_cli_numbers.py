@@ -57,4 +57,4 @@ def test_limits_are_told_with_every_digit() -> None:
         np.arange(40, dtype=np.float32)[:, None], np.repeat([0, 1], 20), np.zeros(40, dtype=int)
     )
     rule_set = mine_rules(demonstrations, supp_min=0.0, conf_min=0.99999999)
-    assert "confidence at least 0.99999999" in limits_text(rule_set)
+    assert "confidence at least 99.999999 %" in limits_text(rule_set)
