@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
@@ -275,11 +276,16 @@ def _mine_at_a_distance(
             f"{files[0]}: what is held out, and where, was settled when it was mined; give this "
             "file alone, with thresholds"
         )
-    if lower_bound and hold_out is None and not of_mined:
+    if of_mined:
+        _require_no_reading(files, env, columns, derived, missing)
+    if into_mined and (lower_bound or max_depth is not None):
         raise InputError(
-            "--lower-bound asks what episodes say that a rule was not mined from, and none is held "
-            "out; give --hold-out as well, as --hold-out 0.2"
+            f"{'--lower-bound' if lower_bound else '--max-depth'} is about rules, and a {MINED} "
+            "file gives those of any; say it when rules are mined from it"
         )
+    nobody = "--lower-bound asks what episodes say that a rule was not mined from, and none is held"
+    if lower_bound and hold_out is None and not of_mined:
+        raise InputError(f"{nobody} out; give --hold-out as well, as --hold-out 0.2")
     from sarl_core.cli.answers.mined import describe_mined, print_mined
     from sarl_core.cli.answers.summaries import (
         describe_rules,
@@ -300,10 +306,21 @@ def _mine_at_a_distance(
         Thresholds(*pair, lift, max_depth)  # refuse them before a file is read
         if cluster is None:
             mined = load_mined_data(files[0])
+            if lower_bound and not mined.held_out:
+                raise InputError(f"{nobody} out in {files[0]}; leave it out")
+            if divider not in (2, mined.divider):
+                raise InputError(
+                    f"the divider is {divider}, and {files[0]} was mined with {mined.divider}; "
+                    "leave it out, or mine the steps again"
+                )
         else:
             from sarl_core.mining.distributed.mining import mine_files
 
-            floor = {} if into_mined and named == [False] * 3 else {"min_support": pair[0]}
+            floor = (
+                {}
+                if into_mined and support is None and setting is None
+                else {"min_support": pair[0]}
+            )
             mined = mine_files(
                 files,
                 cluster,
@@ -345,6 +362,21 @@ def _mine_at_a_distance(
         print_notes(notes)
         print_rules(rule_set, out, tried, elsewhere="--hold-out")
         print_learner(mined.trees)
+
+
+def _require_no_reading(
+    files: Sequence[Path],
+    env: Environment | None,
+    columns: Columns,
+    derived: Derived,
+    missing: Literal["refuse", "drop"],
+) -> None:
+    """Refuse what is said of how steps are read, where there are none."""
+    if env is not None or columns or derived.pairs or derived.formulas or missing != "refuse":
+        raise InputError(
+            f"{files[0]}: how its steps are read, and what is derived from them, was settled when "
+            "it was mined; leave that out, or mine the steps again"
+        )
 
 
 @with_environment
@@ -396,6 +428,9 @@ def landscape(
         if any(map(is_mined_file, files)):
             from sarl_core.mining.distributed.mined_files import load_mined_data
 
+            if len(files) > 1:
+                raise InputError("a file of what is left of steps is read alone; give one")
+            _require_no_reading(files, env, columns, derived, missing)
             mined = load_mined_data(files[0])
             trees, notes = mined.trees, mined.notes
         else:

@@ -351,7 +351,6 @@ def _one(plan: LearningPlan, folder: Path, arm: LearningArm, seed: int, progress
         save_run(folder, latest)
         raise
     _save(folder, result)
-    remove(checkpoint)
 
 
 def _save(folder: Path, result: LearningResult) -> None:
@@ -369,6 +368,7 @@ def _save(folder: Path, result: LearningResult) -> None:
             result.sittings,
         ),
     )
+    remove(run_path(folder, result.arm, result.seed).with_suffix(".pt"))
 
 
 def _sum_up(folder: Path, study: LearningStudy) -> None:

@@ -21,7 +21,7 @@ from sarl_core.demonstrations.formats.columns import Columns, stated
 from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
-from sarl_core.errors import InputError, quoted, require
+from sarl_core.errors import InputError, quoted, require, require_whole
 from sarl_core.mining.combining.candidates import Pair
 from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.mining.distributed.binning import bin_counts, bin_piece, label_counts
@@ -126,9 +126,15 @@ def mine_files(
         WorkError: If the cluster cannot go on, or the extra "cluster" is not installed.
         CancelledError: If the caller wants no more.
     """
-    for name, share in (("support", min_support), ("held-out share", hold_out)):
-        if not (isinstance(share, Real) and 0.0 <= share < 1.0):
-            raise InputError(f"the {name} is {quoted(share)}; give 0 or more, and less than 1")
+    if not (isinstance(min_support, Real) and 0.0 <= min_support <= 1.0):
+        raise InputError(f"the support is {quoted(min_support)}; give 0 to 1")
+    if not (isinstance(hold_out, Real) and 0.0 <= hold_out < 1.0):
+        raise InputError(
+            f"the held-out share is {quoted(hold_out)}; give 0 or more, and less than 1"
+        )
+    require_whole("seed", seed, 0)
+    if max_depth is not None:
+        require_whole("maximum depth", max_depth, 0)
     require(cluster, str, "the cluster must be text", "give its address, or local:2")
     given = [paths] if isinstance(paths, (str, Path)) else list(paths)
     description = None if env_id is None else describe_environment(env_id)
@@ -268,7 +274,8 @@ def _held_out(layout: Layout, plan: ClusterPlan) -> NDArray[np.int64]:
             "there is one episode, and holding it out leaves none to mine from; leave --hold-out "
             "out, or give more episodes"
         )
-    keys = episode_keys(episodes + plan.seed * 1_000_003)
+    drawn = np.uint64(plan.seed * 1_000_003 % 2**64)
+    keys = episode_keys(episodes.astype(np.uint64) + drawn)
     count = min(max(round(plan.hold_out * len(episodes)), 1), len(episodes) - 1, MOST_HELD_OUT)
     return np.sort(episodes[np.argsort(keys, kind="stable")[:count]])
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature, with_formulas
+from sarl_core.demonstrations.fields import ColumnUse
 from sarl_core.demonstrations.formats.arrow.parquet_file import is_text, refusing_damage
 from sarl_core.demonstrations.formats.arrow.table import arrow_table
 from sarl_core.demonstrations.formats.columns import ColumnMap
@@ -29,6 +30,7 @@ from sarl_core.limits import require_memory, table_memory
 
 ROWS = 400_000
 """Of a piece, unless one row group has more."""
+_FEWEST = 2
 _ENDING = ".parquet"
 _PATTERN = frozenset("*?[")
 
@@ -139,9 +141,12 @@ def pieces_of(paths: Sequence[Path]) -> list[Piece]:
             if sizes:
                 require_memory(table_memory(max(sizes), len(kinds), 0))
         for start, groups in _packed(sizes):
-            pieces.append(
-                Piece(str(path), place, start, groups, sum(sizes[start : start + groups]))
-            )
+            rows = sum(sizes[start : start + groups])
+            if start and rows < _FEWEST:  # they are no demonstrations by themselves
+                last = pieces.pop()
+                pieces.append(replace(last, groups=last.groups + groups, rows=last.rows + rows))
+            else:
+                pieces.append(Piece(str(path), place, start, groups, rows))
     if not pieces:
         raise InputError("there are no steps in these files, only columns; give files with some")
     return pieces
@@ -176,9 +181,9 @@ def read_piece(piece: Piece, reading: Reading) -> Demonstrations:
                 error
             )
         recording = recording_from_table(arrow_table(table), reading.columns, reading.description)
-        called = [one.column for one in recording.columns if one.use == ROLE_WORDS["episode"]]
-        if called and is_text(table.schema.field(called[0]).type):
-            table = _with_numbers(table, called[0])
+        named = _name_column(recording.columns, table.schema)
+        if named:
+            table = _with_numbers(table, named)
             recording = recording_from_table(
                 arrow_table(table), reading.columns, reading.description
             )
@@ -194,6 +199,22 @@ def read_piece(piece: Piece, reading: Reading) -> Demonstrations:
         if reading.features is not None:
             read = recoded(read, reading.features, called="it")
         return read
+
+
+def has_named_episodes(piece: Piece, columns: Sequence[ColumnUse]) -> bool:
+    """Whether words say to which episode a row of a piece belongs: the same ones in every file.
+
+    Args:
+        piece: Of a file that this process can open.
+        columns: What its columns were taken for.
+
+    Returns:
+        Whether numbers stand for them.
+    """
+    import pyarrow.parquet as pq
+
+    with refusing_damage(), pq.ParquetFile(piece.path) as file:
+        return bool(_name_column(columns, file.schema_arrow))
 
 
 def some_rows(demonstrations: Demonstrations, rows: NDArray[np.bool_]) -> Demonstrations:
@@ -216,6 +237,13 @@ def some_rows(demonstrations: Demonstrations, rows: NDArray[np.bool_]) -> Demons
         observations=demonstrations.raw_observations[rows],
         **{name: chosen(getattr(demonstrations, name)) for name in names},
     )
+
+
+def _name_column(columns: Sequence[ColumnUse], schema: Any) -> str:
+    """The column that calls episodes by words; "" where none does."""
+    called = [one.column for one in columns if one.use == ROLE_WORDS["episode"]]
+    words = called and called[0] in schema.names and is_text(schema.field(called[0]).type)
+    return called[0] if words else ""
 
 
 def _with_numbers(table: Any, column: str) -> Any:

@@ -22,7 +22,13 @@ from sarl_core.demonstrations.formats.mapping.roles import ROLE_WORDS
 from sarl_core.demonstrations.recoding import recoded
 from sarl_core.demonstrations.words import columns_of_words, indicators_of, spelled, words_of
 from sarl_core.errors import InputError, quoted
-from sarl_core.mining.distributed.pieces import Piece, Reading, read_piece, some_rows
+from sarl_core.mining.distributed.pieces import (
+    Piece,
+    Reading,
+    has_named_episodes,
+    read_piece,
+    some_rows,
+)
 
 _MIX = np.uint64(0x9E3779B97F4A7C15)
 _MOST = 2.0**64
@@ -43,6 +49,7 @@ class Survey:
         rows: How many steps the piece has.
         episodes: The numbers of its episodes, ascending.
         rising: Whether they stand in that order.
+        named: Whether numbers stand for words, which are the same in every file.
         sums: Of the keys of all rows, two of them: whatever the order of the rows is.
         low: Least action in each dimension, (m,).
         high: Largest, likewise.
@@ -53,6 +60,7 @@ class Survey:
     rows: int
     episodes: NDArray[np.int64]
     rising: bool
+    named: bool
     sums: tuple[int, int]
     low: tuple[float, ...]
     high: tuple[float, ...]
@@ -140,6 +148,7 @@ def survey_piece(piece: Piece, reading: Reading, share: float) -> Survey:
         rows=len(read),
         episodes=np.unique(numbers),
         rising=bool((np.diff(numbers) > 0).all()),
+        named=has_named_episodes(piece, read.columns),
         sums=(_sum(keys), _sum(_mixed(keys ^ _OTHER))),
         low=tuple(read.action_columns.min(axis=0).tolist()),
         high=tuple(read.action_columns.max(axis=0).tolist()),
@@ -226,9 +235,9 @@ def layout_of(pieces: Sequence[Piece], surveys: Sequence[Survey]) -> Layout:
     )
 
 
-def episode_keys(episodes: NDArray[np.int64]) -> Keys:
+def episode_keys(episodes: Keys) -> Keys:
     """A number by chance for each episode, always the same for the same number of an episode."""
-    return _mixed(episodes.astype(np.uint64) * _OTHER + _MIX)
+    return _mixed(episodes * _OTHER + _MIX)
 
 
 def row_keys(demonstrations: Demonstrations) -> Keys:
@@ -401,6 +410,8 @@ def _offsets(pieces: Sequence[Piece], surveys: Sequence[Survey]) -> tuple[int, .
     places = [file for file, _ in groupby(piece.file for piece in pieces)]
     numbers = [np.unique(np.concatenate([one.episodes for one in several])) for several in files]
     offsets = dict.fromkeys(range(places[-1] + 1), 0)
+    if any(one.named for several in files for one in several):
+        return tuple(offsets.values())
     if sum(map(len, numbers)) > len(np.unique(np.concatenate(numbers))) and not _continue(files):
         after = 0
         for place, own in zip(places, numbers, strict=True):

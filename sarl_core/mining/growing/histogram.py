@@ -315,7 +315,7 @@ class _Growth:
         learner = DecisionTreeClassifier(
             max_depth=None if self.max_depth is None else self.max_depth - part.depth,
             min_samples_split=self.least,
-            random_state=self.seed,
+            random_state=self.seed % 2**32,
         )
         below = fitted(learner, bins, part.keys[0] // BINS)
         below = replace(below, threshold=np.floor(below.threshold))
