@@ -112,6 +112,18 @@ WRONG = {
         ["FILE", "--cluster", "local:1", "--lower-bound", "0.5", *FILTERED, "--out", "r.json"],
         "none is held out; give --hold-out",
     ),
+    "columns of no steps": (
+        ["MINED", "--column", "x=ignore", *FILTERED, "--out", "r.json"],
+        "how its steps are read, and what is derived from them, was settled",
+    ),
+    "another divider": (
+        ["MINED", "--divider", "5", *FILTERED, "--out", "r.json"],
+        "the divider is 5, and",
+    ),
+    "a depth of any rules": (
+        ["FILE", "--cluster", "local:1", "--max-depth", "3", "--out", "r.mined"],
+        "--max-depth is about rules",
+    ),
     "no cluster": (
         ["FILE", "--cluster", "here", *FILTERED, "--out", "r.json"],
         "'here' is no cluster",

@@ -216,11 +216,17 @@ def layout_of(pieces: Sequence[Piece], surveys: Sequence[Survey]) -> Layout:
         _placed(survey.head, derived, dimensions, offsets[piece.file])
         for piece, survey in zip(pieces, surveys, strict=True)
     ]
-    joined = {name: np.concatenate([one[name] for one in placed]) for name in placed[0]}
+    joined = {
+        name: np.concatenate([one[name] for one in placed])
+        for name, values in placed[0].items()
+        if values is not None
+    }
     sampled = np.concatenate([survey.sampled for survey in surveys])
     if sampled.sum() >= _FEWEST:  # else all of a few rows are in it, by chance
         joined = {name: values[sampled] for name, values in joined.items()}
-    order = np.lexsort((joined["steps"], joined["episodes"]))
+    # Where nothing numbers the steps, they stay in the order in which they stand in the files.
+    steps = joined.get("steps", np.arange(len(joined["episodes"])))
+    order = np.lexsort((steps, joined["episodes"]))
     joined = {name: values[order] for name, values in joined.items()}
     sample = Demonstrations(**(joined | fields))
     numbers = [
@@ -274,9 +280,7 @@ def _columns(demonstrations: Demonstrations) -> Iterator[Keys]:
         else:
             yield _bits(actions)
     yield _bits(demonstrations.episodes)
-    if any(
-        one.use == ROLE_WORDS["step"] for one in demonstrations.columns
-    ):  # else they are counted
+    if _says_steps(demonstrations):
         assert demonstrations.steps is not None
         yield _bits(demonstrations.steps)
 
@@ -447,5 +451,10 @@ def _placed(
         "observations": same.raw_observations,
         "actions": columns.reshape(-1) if piece.actions.ndim == 1 else columns,
         "episodes": same.episodes + offset,
-        "steps": np.asarray(same.steps),
+        "steps": np.asarray(same.steps) if _says_steps(piece) else None,
     }
+
+
+def _says_steps(demonstrations: Demonstrations) -> bool:
+    """Whether a column numbers the steps; else they are counted from where the piece begins."""
+    return any(one.use == ROLE_WORDS["step"] for one in demonstrations.columns)

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import Any
 
+import dask
 import numpy as np
 import pandas as pd
 import pytest
@@ -13,6 +14,7 @@ import pytest
 from sarl_core import InputError, WorkError
 from sarl_core.clusters import cluster, saying_losses
 from sarl_core.mining.distributed import pieces
+from sarl_core.mining.distributed.mining import mine_files
 from sarl_core.mining.distributed.pieces import Reading, parquet_paths, read_piece
 from tests.mining.distributed.conftest import Mine
 
@@ -71,6 +73,39 @@ def test_numbers_of_episodes_that_begin_again_are_other_episodes(
     named = mine(folder_of(tmp_path / "named", steps().assign(episode=texts)), hold_out=0.5)
     assert named.trees[0].source.episodes == 4
     assert named.held_out[0].lengths.tolist() == [50] * 4
+
+
+def test_named_episodes_go_on_in_the_next_file(tmp_path: Path, mine: Mine) -> None:
+    table = steps().assign(episode=lambda one: "run-" + one.episode.astype(str))
+    whole = mine(folder_of(tmp_path / "whole", table), hold_out=0.5)
+    cut = mine(folder_of(tmp_path / "cut", table[:225], table[225:]), hold_out=0.5)
+    assert cut.trees[0].source.episodes == 4
+    assert cut.trees[0].digest == whole.trees[0].digest
+
+
+def test_a_row_that_a_piece_would_have_alone_goes_with_those_before(
+    tmp_path: Path, mine: Mine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(pieces, "ROWS", 100)
+    (tmp_path / "logs").mkdir()
+    steps(301).to_parquet(tmp_path / "logs" / "log.parquet", row_group_size=100)
+    cut = pieces.pieces_of(parquet_paths([tmp_path / "logs"]))
+    assert [piece.rows for piece in cut] == [100, 100, 101]
+    assert mine(tmp_path / "logs").trees[0].samples[0] == 301
+
+
+def test_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
+    folder = folder_of(tmp_path / "logs", steps())
+    for options, sentence in (
+        ({"seed": -1}, "seed"),
+        ({"max_depth": -1}, "maximum depth"),
+        ({"min_support": 1.5}, "support is 1.5; give 0 to 1"),
+        ({"hold_out": 1.0}, "held-out share is 1.0"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            mine_files(folder, "local:1", **options)
+    mined = mine_files(folder, "local:1", seed=10**16, hold_out=0.3, min_support=1.0)
+    assert mined.trees[0].n_nodes <= 3
 
 
 def test_bounds_of_continuous_actions_are_those_of_all_files(tmp_path: Path, mine: Mine) -> None:
@@ -176,6 +211,8 @@ def test_workers_of_another_version(client: Any, monkeypatch: pytest.MonkeyPatch
 
 def test_work_that_ends_every_worker() -> None:
     with (
+        # One that ends is enough: of several, the next may be called off while it starts.
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
         cluster("local:1") as other,
         pytest.raises(WorkError, match="several workers ended over the same piece of work"),
         saying_losses(),
