@@ -254,8 +254,8 @@ def _at_once(
     return diverged
 
 
-def _learned(plan: LearningPlan, seed: int, arm: LearningArm) -> LearningResult:
-    """One run from its beginning to its end."""
+def _learned(plan: LearningPlan, seed: int, arm: LearningArm, **meanwhile: Any) -> LearningResult:
+    """One run to its end, with what `learn` takes to be watched and taken up again."""
     return learn(
         plan.env_id,
         plan.rules,
@@ -265,6 +265,7 @@ def _learned(plan: LearningPlan, seed: int, arm: LearningArm) -> LearningResult:
         projection=plan.projection,
         episodes=plan.episodes,
         max_steps=plan.max_steps,
+        **meanwhile,
     )
 
 
@@ -332,19 +333,7 @@ def _one(plan: LearningPlan, folder: Path, arm: LearningArm, seed: int, progress
             written = time.monotonic()
 
     try:
-        result = learn(
-            plan.env_id,
-            plan.rules,
-            arm,
-            steps=plan.steps,
-            seed=seed,
-            projection=plan.projection,
-            episodes=plan.episodes,
-            max_steps=plan.max_steps,
-            checkpoint=checkpoint,
-            progress=progress,
-            watch=watch,
-        )
+        result = _learned(plan, seed, arm, checkpoint=checkpoint, progress=progress, watch=watch)
     except DivergedError:
         raise
     except (CancelledError, WorkError):

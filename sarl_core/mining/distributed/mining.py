@@ -204,6 +204,10 @@ def mine_on_cluster(
         counted = added_up(client, [client.submit(bin_counts, one, max(bins)) for one in rows])
         steps = int(labels[0].sum())
         structures = []
+
+        def growing(tree: int) -> Callable[[float], None]:
+            return lambda share: advance(0.4 + 0.4 * (tree + share) / len(dimensions))
+
         for index, dimension in enumerate(dimensions):
             growth = DistributedGrowth(
                 client,
@@ -214,9 +218,7 @@ def mine_on_cluster(
                 least=math.ceil(plan.min_support * steps),
                 max_depth=plan.max_depth,
                 seed=plan.seed,
-                advance=lambda share, index=index: advance(  # type: ignore[misc]
-                    0.4 + 0.4 * (index + share) / len(dimensions)
-                ),
+                advance=growing(index),
             )
             structures.append(_of_values(growth.grow(), borders))
         in_bins = counted.result()
