@@ -236,6 +236,11 @@ class _Clock:
         self.done += units
         report(self.progress, min(self.done, self.total), self.total)
 
+    def during(self, *_: int) -> bool:
+        """For work that takes its time and plays no episodes."""
+        self.tick(0)
+        return True
+
     def of(self) -> Progress:
         """For work that counts its own episodes from 0."""
         before = self.done
@@ -291,7 +296,7 @@ class _Run:
         chosen = _choice_cost(plan, _most_choices(plan))
         return plan.rounds * plan.episodes + refined + chosen + plan.report
 
-    def grow(self, index: int) -> tuple[PolicyTree, ...]:
+    def grow(self, index: int, clock: _Clock) -> tuple[PolicyTree, ...]:
         """The trees of a round (counted from 0)."""
         pairs = self.answers.pairs(index)
         known = expert_scores(self.expert, pairs.raw_observations)
@@ -304,9 +309,10 @@ class _Run:
             max_rules=self.plan.max_rules,
             divider=self.plan.divider,
             seed=self.plan.seed + index,
+            progress=clock.during,
             **ways,
         )
-        return trees_over_used(self.alternated(trees, pairs, known, index), pairs)
+        return trees_over_used(self.alternated(trees, pairs, known, index, clock), pairs)
 
     def alternated(
         self,
@@ -314,6 +320,7 @@ class _Run:
         pairs: Demonstrations,
         known: NDArray[np.float64] | None,
         index: int,
+        clock: _Clock,
     ) -> tuple[PolicyTree, ...]:
         """Trees of a round with their queries chosen anew, each by what the others make of it."""
         rows, most = np.arange(len(pairs)), max(_ALTERNATED, _A_RULE * self.plan.max_rules)
@@ -322,6 +329,7 @@ class _Run:
             rows = np.sort(generator.choice(rows, most, replace=False))
         result = []
         for tree in trees:
+            clock.tick(0)
             scores = known
             if scores is None:
                 scores = label_scores(pairs, tree.dimension, tree.index)
@@ -370,7 +378,7 @@ class _Run:
         return seeds.of_run(first, self.plan.seed)
 
     def round(self, number: int, clock: _Clock) -> None:
-        trees = self.grow(number - 1)
+        trees = self.grow(number - 1, clock)
         rules = self.rules(trees)
         played = self.shielded(
             rules,

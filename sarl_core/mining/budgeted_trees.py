@@ -21,6 +21,7 @@ from sarl_core.mining.labels import LabelledDimension, label_dimensions
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import LEAF, PolicyTree, source_of
+from sarl_core.progress import Progress, report
 
 MIN_RULES = 2
 _LEAST_PAIRS = 5  # a mean of fewer values is no mean
@@ -34,6 +35,7 @@ def grow_budgeted_trees(
     scores: NDArray[np.float64] | None = None,
     divider: int = 2,
     seed: int = 0,
+    progress: Progress | None = None,
 ) -> tuple[PolicyTree, ...]:
     """Grow one tree an action dimension, the most helpful query first, to so many leaves.
 
@@ -47,6 +49,7 @@ def grow_budgeted_trees(
             dimensions the values shown: a leaf then says the interval of their mean.
         divider: Number of intervals of continuous dimensions.
         seed: For choosing among equally good queries.
+        progress: Called with (trees grown, in all); returning False stops.
 
     Returns:
         One tree an action dimension; what a node says may differ from its most frequent label
@@ -54,6 +57,7 @@ def grow_budgeted_trees(
 
     Raises:
         InputError: If the number of rules or the divider is out of range.
+        CancelledError: If `progress` returned False.
     """
     if max_rules < MIN_RULES:
         raise InputError(f"the budget is {max_rules} rules; give {MIN_RULES} or more")
@@ -62,6 +66,7 @@ def grow_budgeted_trees(
         raise ValueError("scores are for demonstrations of one action dimension")
     trees = []
     for index, dimension in enumerate(dimensions):
+        report(progress, index, len(dimensions))
         if scores is not None:
             structure = _by_scores(demonstrations, scores, max_rules, weights, seed)
         elif dimension.is_interval:

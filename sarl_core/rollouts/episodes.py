@@ -6,7 +6,6 @@ does not depend on what runs beside it, nor on the number of processes.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
@@ -506,11 +505,13 @@ def rollout(
     calls = ((place, work, (env_id, actor, shield, piece)) for place, piece in enumerate(pieces))
     parts: dict[int, Episodes] = {}
     with closing(completed(workers, calls, lost=LOST)) as batches:
-        for place, part in itertools.chain.from_iterable(batches):
-            if isinstance(part, SarlError):
-                raise part
-            parts[place] = part
-            finished(len(part))
+        for batch in batches:
+            finished(0)  # whoever wants no more need not wait for a long episode
+            for place, part in batch:
+                if isinstance(part, SarlError):
+                    raise part
+                parts[place] = part
+                finished(len(part))
     return join([parts[place] for place in range(len(pieces))])
 
 

@@ -14,6 +14,7 @@ from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules, wit
 from sarl_core.mining.growing.structure import TreeStructure
 from sarl_core.mining.rule_tree import recount
 from sarl_core.mining.tree import LEAF
+from sarl_core.progress import CancelledError
 from tests.mining.strategies import labelled_states
 
 
@@ -52,6 +53,17 @@ def test_the_most_helpful_query_comes_first():
     assert abs(tree.threshold[0]) < 0.02
     (tree,) = grow_budgeted_trees(steps(), max_rules=3)
     assert sorted(tree.label[tree.feature == LEAF].tolist()) == [0, 1, 2]
+
+
+def test_growing_can_be_stopped_between_two_trees():
+    both = np.stack([steps().observations[:, 0]] * 2, axis=1)
+    demonstrations = Demonstrations(steps().observations, both, steps().episodes)
+    calls: list[tuple[int, int]] = []
+    with pytest.raises(CancelledError, match="stopped after 1 of 2"):
+        grow_budgeted_trees(
+            demonstrations, max_rules=2, progress=lambda *done: calls.append(done) or done[0] < 1
+        )
+    assert calls == [(0, 2), (1, 2)]
 
 
 def test_a_pair_that_matters_more_is_asked_about_first():

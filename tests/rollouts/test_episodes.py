@@ -1,4 +1,5 @@
 import json
+from concurrent.futures import Executor, Future
 from typing import Any
 
 import numpy as np
@@ -274,6 +275,19 @@ def test_progress_counts_episodes_and_can_stop(jobs: int) -> None:
 
     with pytest.raises(KeyboardInterrupt):
         rollout("CartPole-v1", "novice", episodes=9, jobs=jobs, progress=fail)
+
+
+def test_who_wants_no_more_waits_for_no_episode() -> None:
+    class Never(Executor):
+        workers = 1
+
+        def submit(self, call: Any, /, *arguments: Any, **named: Any) -> Future[Any]:
+            return Future()
+
+    with pytest.raises(CancelledError, match="stopped after 0 of 3"):
+        rollout(
+            "CartPole-v1", "novice", episodes=3, executor=Never(), progress=lambda done, _: done > 0
+        )
 
 
 def test_an_endless_environment_is_truncated(monkeypatch: pytest.MonkeyPatch) -> None:
