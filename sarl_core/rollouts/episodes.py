@@ -505,9 +505,9 @@ def rollout(
     calls = ((place, work, (env_id, actor, shield, piece)) for place, piece in enumerate(pieces))
     parts: dict[int, Episodes] = {}
     with closing(completed(workers, calls, lost=LOST)) as batches:
-        for batch in batches:
+        for finished_ones in batches:
             finished(0)  # whoever wants no more need not wait for a long episode
-            for place, part in batch:
+            for place, part in finished_ones:
                 if isinstance(part, SarlError):
                     raise part
                 parts[place] = part
