@@ -71,6 +71,17 @@ def mine(
             help="Minimum share of those in which the expert did what the rule says.",
         ),
     ] = None,
+    never: Annotated[
+        float | None,
+        typer.Option(
+            "--never",
+            metavar="EPSILON",
+            show_default=False,
+            help="Mine rules that forbid: an action that the expert takes in at most this share of "
+            "the states of a rule, by its upper 95 % bound, as 0.1. With --confidence or --setting "
+            "beside rules that demand one, which then go first.",
+        ),
+    ] = None,
     setting: Annotated[
         Literal["filtered", "unfiltered"] | None,
         typer.Option(
@@ -137,7 +148,10 @@ def mine(
     Example: `python -m sarl_core mine data/demonstrations/lunar_lander.parquet --support 0.005
     --confidence 0.95 --out rules.json`
     """
-    if cluster is not None or any(map(is_mined_file, [out, *files])):
+    far = cluster is not None or any(map(is_mined_file, [out, *files]))
+    if never is not None:
+        _require_near(far, hold_out, lower_bound, cross_fit=cross_fit)
+    if far:
         _mine_at_a_distance(
             files,
             out,
@@ -159,7 +173,9 @@ def mine(
         return
     terminal.check_output(out, (".json",))
     given = [value is not None for value in (support, confidence, setting)]
-    if given not in ([True, True, False], [False, False, True]):
+    demands = given in ([True, True, False], [False, False, True])
+    forbids_alone = never is not None and given in ([True, False, False], [False, False, False])
+    if not demands and not forbids_alone:
         raise InputError("give both --support and --confidence, or --setting instead of them")
     if lower_bound and hold_out is None:
         raise InputError(
@@ -180,14 +196,17 @@ def mine(
         from sarl_core.mining.combining.choice import chosen_again
         from sarl_core.mining.envelope import with_boxes
         from sarl_core.mining.growing.growth import grow_policy_trees, learner_for
+        from sarl_core.mining.never.never_rules import mine_never_rules, with_never_rules
         from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
         from sarl_core.mining.validation import cross_fitting, holding_out
         from sarl_core.mining.validation.episode_counts import count_rules
+        from sarl_core.shielding.leeway import leeway_of
 
         pair = (support or 0.0, confidence or 0.0)
         if setting is not None:
             pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
-        Thresholds(*pair, lift, max_depth)  # refuse them before the file is read
+        # Refuse them before the file is read.
+        Thresholds(*pair, lift, max_depth, never)
         demonstrations = read_demonstrations(files, env, columns, missing)
         demonstrations = with_wanted(demonstrations, derived, divider=divider)
         combined = pairs_of(demonstrations, derived)
@@ -201,10 +220,18 @@ def mine(
             demonstrations = split.mined
         chosen = learner_for(learner, len(demonstrations))
         trees = grow_policy_trees(demonstrations, divider=divider, learner=chosen)
-        mined_rules = mine_rules(
-            trees, supp_min=pair[0], conf_min=pair[1], lift_min=lift, max_depth=max_depth
-        )
+        if forbids_alone and never is not None:
+            mined_rules = mine_never_rules(
+                trees, epsilon=never, supp_min=pair[0], max_depth=max_depth
+            )
+        else:
+            mined_rules = mine_rules(
+                trees, supp_min=pair[0], conf_min=pair[1], lift_min=lift, max_depth=max_depth
+            )
+            if never is not None:
+                mined_rules = with_never_rules(mined_rules, trees, never)
         rule_set = with_boxes(mined_rules, demonstrations)
+        leeway = None if never is None else leeway_of(rule_set, demonstrations)
         judged = None
         if cross_fit:
             fit = cross_fitting.cross_fit(
@@ -228,11 +255,32 @@ def mine(
             tried = Tried(hold_out, seed, split.mined.n_episodes, judged_on_them, short)
         rule_set.save(out)
     if as_json:
-        terminal.print_json(describe_rules(rule_set, out, tried, judged) | oddities)
+        terminal.print_json(describe_rules(rule_set, out, tried, judged, leeway) | oddities)
     else:
         print_oddities(oddities)
-        print_rules(rule_set, out, tried, judged)
+        print_rules(rule_set, out, tried, judged, leeway=leeway)
         print_learner(trees)
+
+
+def _require_near(
+    far: bool, hold_out: float | None, lower_bound: float | None, *, cross_fit: bool
+) -> None:
+    """Refuse what is not known of rules that forbid.
+
+    Raises:
+        InputError: If any of it was asked for.
+    """
+    options = {
+        "--cluster, or a .mined file,": far,
+        "--hold-out": hold_out is not None,
+        "--lower-bound": lower_bound is not None,
+        "--cross-fit": cross_fit,
+    }
+    for option, given in options.items():
+        if given:
+            raise InputError(
+                f"{option} is for rules that demand an action; leave it out, or leave out --never"
+            )
 
 
 def _mine_at_a_distance(

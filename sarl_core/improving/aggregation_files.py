@@ -13,7 +13,7 @@ import numpy as np
 from sarl_core.errors import WorkError
 from sarl_core.files import whole_file
 from sarl_core.improving.aggregation import Aggregation, AggregationRound
-from sarl_core.mining.rule_files import write_rules
+from sarl_core.mining.rule_files.writing import write_rules
 from sarl_core.rollouts.statistics import summarise
 
 

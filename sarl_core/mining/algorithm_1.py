@@ -144,7 +144,7 @@ def rules_at(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[Rule]:
             demonstrated_value=_demonstrated(tree, node),
         )
         for (number, node, label, support, confidence, lift, samples), conditions in zip(
-            numbers, _conditions(tree, nodes), strict=True
+            numbers, conditions_to(tree, nodes), strict=True
         )
     ]
 
@@ -156,8 +156,16 @@ def _demonstrated(tree: PolicyTree, node: int) -> float | None:
     return float(np.median(tree.demonstrated[rows])) if len(rows) else None
 
 
-def _conditions(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[tuple[Condition, ...]]:
-    """The queries on the way to each node; rules share the beginnings of their paths."""
+def conditions_to(tree: PolicyTree, nodes: NDArray[np.int64]) -> list[tuple[Condition, ...]]:
+    """The queries on the way to each node; rules share the beginnings of their paths.
+
+    Args:
+        tree: With n nodes.
+        nodes: Node numbers, (k,).
+
+    Returns:
+        One path a node.
+    """
     known: dict[int, tuple[Condition, ...]] = {0: ()}
     parent, left = tree.parent.tolist(), tree.children_left.tolist()
     feature, threshold = tree.feature.tolist(), tree.threshold.tolist()

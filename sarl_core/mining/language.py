@@ -12,8 +12,8 @@ from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.derived import extended_state
 from sarl_core.environments.formulas import Formula
-from sarl_core.mining.digits import amount_text, limit_texts
-from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.action_words import action_text, says_text
+from sarl_core.mining.digits import limit_texts
 from sarl_core.mining.rule_contents import RuleContents
 from sarl_core.mining.rules import Bounds, Condition, Rule, share_bounds
 
@@ -24,8 +24,6 @@ _IS = " is "
 _IS_NOT = " is not "
 _FLAG_WORDS = ("contact",)
 _THE = "the {}".format
-# Labels that say nothing without the action that they are of.
-_NO_ACTIONS = {"true", "false", "yes", "no", "on", "off", "none", "t", "f", "y", "n"}
 
 
 def number_text(value: float, *, apart_from: float | None = None) -> str:
@@ -359,56 +357,6 @@ def exact_condition(condition: Condition, features: tuple[Feature, ...]) -> str:
     return f"{features[condition.feature].name} {condition.op} {condition.threshold!r}"
 
 
-def action_text(label: int, dimension: LabelledDimension) -> str:
-    """What a rule says to do.
-
-    Args:
-        label: The label.
-        dimension: Whose label it is.
-
-    Returns:
-        As "push right", "action 2", "brake true", or "torque from -2 to 0".
-    """
-    if dimension.is_interval:
-        from_ = "" if dimension.edges[label] == dimension.edges[label + 1] else "from "
-        return f"{dimension.name} {from_}{dimension.label_names[label]}"
-    name = dimension.label_names[label]
-    bare = name.lstrip("+-").replace(".", "", 1).isdigit() or name.lower() in _NO_ACTIONS
-    return f"{dimension.name} {name}" if bare else name
-
-
-def done_text(value: float, dimension: LabelledDimension, *, beside: Sequence[float] = ()) -> str:
-    """What was proposed or executed in one action dimension.
-
-    Args:
-        value: The action.
-        dimension: Whose it is.
-        beside: Other actions of the dimension that are shown with it.
-
-    Returns:
-        As "push right" or "torque -1.2"; two continuous actions that differ do not read the same.
-    """
-    if dimension.is_interval:
-        return f"{dimension.name} {amount_text(value, dimension, beside=beside)}"
-    label = dimension.label_of(value)
-    if not 0 <= label < dimension.n_labels:
-        return f"{dimension.name} {decimal_text(value)}"
-    return action_text(label, dimension)
-
-
-def label_text(label: int, dimension: LabelledDimension) -> str:
-    """A label where its dimension is known: in tables and legends.
-
-    Args:
-        label: The label.
-        dimension: Whose label it is.
-
-    Returns:
-        As "push right" or "-2 to 0".
-    """
-    return dimension.label_names[label]
-
-
 def conditions_text(rule: Rule, rule_set: RuleContents) -> str:
     """All conditions of a rule in signs, for tables.
 
@@ -454,14 +402,14 @@ def sentence(
         return condition_text(bounds, features[bounds.feature], beside=beside)
 
     parts = _condition_texts(rule, features, text_of, _THE)
-    action = action_text(rule.action, rule_set.actions[rule.dimension])
+    action = says_text(rule, rule_set.actions[rule.dimension])
     return _sentence(rule, parts, action, evidence=evidence)
 
 
 def _sentence(rule: Rule, parts: Sequence[str], action: str, *, evidence: bool) -> str:
     """A sentence of its conditions and of what follows."""
     if not parts:
-        text = f"Always {action}"
+        text = f"{action[0].upper()}{action[1:]}" if rule.forbids else f"Always {action}"
     elif len(parts) == 1:
         text = f"If {parts[0]}, then {action}"
     else:
@@ -469,6 +417,8 @@ def _sentence(rule: Rule, parts: Sequence[str], action: str, *, evidence: bool) 
     if not evidence or rule.origin != "mined":
         return f"{text}."
     states = "1 state" if rule.samples == 1 else f"{rule.samples:,} states"
+    if rule.forbids:
+        return f"{text}: the expert did not in {share_text(rule.confidence)} of {states}."
     return f"{text}: so did the expert in {share_text(rule.confidence)} of {states}."
 
 
@@ -501,13 +451,16 @@ class Wording:
         self._any_words = any(feature.indicator is not None for feature in features)
         self._long = BoundsTexts(lambda one: condition_text(one, features[one.feature]))
         self._short = BoundsTexts(lambda one: short_condition(one, features[one.feature]))
+        self._dimensions = rule_set.actions
         self._actions = [
             [action_text(label, dimension) for label in range(dimension.n_labels)]
             for dimension in rule_set.actions
         ]
 
     def action(self, rule: Rule) -> str:
-        """As `action_text`."""
+        """As `says_text`."""
+        if rule.forbids:
+            return says_text(rule, self._dimensions[rule.dimension])
         return self._actions[rule.dimension][rule.action]
 
     def conditions(self, rule: Rule) -> str:
@@ -570,10 +523,11 @@ def limits_text(rule_set: RuleContents) -> str:
         As "support at least 0.005, confidence at least 0.95".
     """
     thresholds = rule_set.thresholds
-    limits = [
-        f"support at least {limit_text(thresholds.support)}",
-        f"confidence at least {limit_text(thresholds.confidence)}",
-    ]
+    limits = [f"support at least {limit_text(thresholds.support)}"]
+    if any(not rule.forbids for rule in rule_set.rules) or thresholds.never is None:
+        limits.append(f"confidence at least {limit_text(thresholds.confidence)}")
+    if thresholds.never is not None:
+        limits.append(f"forbidden what the expert does in at most {limit_text(thresholds.never)}")
     if rule_set.cut == "leaves":
         limits = ["every leaf of the tree"]
     if thresholds.lift:

@@ -10,25 +10,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
 from sarl_core.files import as_path, whole_file
 from sarl_core.limits import limited_bytes
+from sarl_core.mining.action_words import says_label, says_text
 from sarl_core.mining.edit_counts import edits_counted, is_plain, reading_order, regrown_text
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
     Wording,
-    action_text,
     conditions_text,
     counted,
     exact_condition,
     formula_texts,
-    label_text,
     limits_text,
     share_text,
 )
 from sarl_core.mining.rule_contents import RuleContents
-from sarl_core.mining.rule_files import file_parts, read_rules, write_rules
+from sarl_core.mining.rule_files.reading import read_rules
+from sarl_core.mining.rule_files.writing import file_parts, write_rules
 from sarl_core.mining.rules import Rule, as_numbered, name_at
 from sarl_core.notebooks import MOST_ROWS, table_html
 
@@ -100,7 +101,7 @@ class RuleSet(RuleContents, Sequence[Rule]):
             (
                 self.name_of(rule),
                 conditions_text(rule, self),
-                action_text(rule.action, self.actions[rule.dimension]),
+                says_text(rule, self.actions[rule.dimension]),
                 share_text(rule.support),
                 share_text(rule.confidence),
                 f"{rule.samples:,}",
@@ -122,15 +123,30 @@ class RuleSet(RuleContents, Sequence[Rule]):
 
     @property
     def coverage(self) -> float:
-        """Share of pairs to which a rule applies, averaged over action dimensions."""
+        """Share of pairs to which a rule applies, averaged over action dimensions.
+
+        NaN with never-rules: they overlap, and only the pairs know what they cover together.
+        """
+        if self.forbids:
+            return float("nan")
         pairs = self.source.steps * len(self.actions)
         return sum(rule.samples for rule in self.rules) / pairs
 
     @property
     def fidelity(self) -> float:
-        """Share of the covered pairs whose label the rule gives; NaN where none is covered."""
+        """Share of the covered pairs whose label the rule gives; NaN where none is covered.
+
+        NaN with never-rules, too.
+        """
+        if self.forbids:
+            return float("nan")
         covered = sum(rule.samples for rule in self.rules)
         return sum(rule.correct for rule in self.rules) / covered if covered else float("nan")
+
+    @cached_property
+    def forbids(self) -> bool:
+        """Whether any of the rules is a never-rule."""
+        return any(rule.forbids for rule in self.rules)
 
     @cached_property
     def names(self) -> Mapping[str, str]:
@@ -189,7 +205,7 @@ class RuleSet(RuleContents, Sequence[Rule]):
                 "name": [self.name_of(rule) for rule in self],
                 "id": [rule.id for rule in self],
                 "dimension": [self.actions[rule.dimension].name for rule in self],
-                "action": [label_text(rule.action, self.actions[rule.dimension]) for rule in self],
+                "action": [says_label(rule, self.actions[rule.dimension]) for rule in self],
                 "rule": [wording.sentence(rule, evidence=False) for rule in self],
                 "conditions": list(conditions),
                 **{
@@ -252,8 +268,10 @@ class RuleSet(RuleContents, Sequence[Rule]):
             if one
             else f"{self.mean_length:.2f} conditions on average"
         )
-        rest = edits_counted(self)
-        if is_plain(self):
+        rest = f"{sum(rule.kind == 'never' for rule in self.rules):,} of them forbid"
+        if not is_plain(self):
+            rest = edits_counted(self)
+        elif not self.forbids:
             they, are = ("it covers", "is") if one else ("they cover", "are")
             rest = (
                 f"{they} {share_text(self.coverage)} of the states and {are} right in "
@@ -326,6 +344,38 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
         InputError: If it is no rule file, or holds anything this version does not know.
     """
     return RuleSet(**vars(read_rules(text, name)))
+
+
+def require_demands(rule_set: RuleSet, what: str) -> None:
+    """Refuse rules that forbid, where only what rules demand is understood.
+
+    Args:
+        rule_set: Any.
+        what: Understands no others, as "the report".
+
+    Raises:
+        InputError: If there are never-rules among them.
+    """
+    if rule_set.forbids:
+        raise InputError(
+            f"{what} understands rules that demand an action, and some of these forbid one; mine "
+            "rules without --never for it"
+        )
+
+
+def obeying_labels(rule_set: RuleContents) -> NDArray[np.bool_]:
+    """Which labels each rule lets be.
+
+    Args:
+        rule_set: R rules.
+
+    Returns:
+        Shape (R, L) for the L labels of the dimension that has most.
+    """
+    most = max(dimension.n_labels for dimension in rule_set.actions)
+    every = np.arange(most)
+    rows = [rule.obeyed_by(every) for rule in rule_set.rules]
+    return np.array(rows, dtype=np.bool_).reshape(-1, most)
 
 
 def exact_texts(rule_set: RuleContents) -> Iterator[str]:

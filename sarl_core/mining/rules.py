@@ -15,6 +15,7 @@ from sarl_core.errors import InputError, require
 from sarl_core.mining.evidence import DataBox, HeldOut
 
 Operator = Literal["<=", ">"]
+Kind = Literal["do", "never"]
 T = TypeVar("T")
 
 FIRST_REGROWN, LAST_REGROWN = 10**15, 9 * 10**15 - 1
@@ -58,10 +59,11 @@ class Rule:
         id: Unique within its rule set; of a mined rule "dimension.node".
         dimension: Action dimension it speaks of.
         conditions: In path order; () applies always.
-        action: The label.
+        action: The label; of a never-rule that which comes first in the place of what it forbids.
         support: Share of all pairs to which it applies.
-        confidence: Share of those that carry its label.
-        lift: Confidence over the label's share of all pairs.
+        confidence: Share of those that carry its label; of a never-rule, that carry none which it
+            forbids.
+        lift: Confidence over the same share of all pairs.
         samples: Number of pairs to which it applies.
         enabled: Whether a shield uses it.
         origin: Whether it was mined or written by a person.
@@ -71,6 +73,9 @@ class Rule:
             mined, in the order of the rule set, as manual ones do.
         box: Where its pairs lay; None where that was not kept.
         held_out: How it fares on episodes held out; None where there are none.
+        forbids: The labels that a never-rule forbids, ascending; () for a rule that demands one.
+        instead: Of a never-rule the other labels, the most frequent where it applies first: what
+            comes in the place of one that it forbids is the first that no other rule forbids.
     """
 
     id: str
@@ -87,6 +92,31 @@ class Rule:
     pinned: bool = False
     box: DataBox | None = None
     held_out: HeldOut | None = None
+    forbids: tuple[int, ...] = ()
+    instead: tuple[int, ...] = ()
+
+    @property
+    def kind(self) -> Kind:
+        """Whether it says what to do, or what never to do."""
+        return "never" if self.forbids else "do"
+
+    @property
+    def label(self) -> int:
+        """The label that it speaks of: what it demands, or the first that it forbids."""
+        return self.forbids[0] if self.forbids else self.action
+
+    def obeyed_by(self, labels: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether actions are as it says.
+
+        Args:
+            labels: Of its dimension, any shape.
+
+        Returns:
+            The same shape.
+        """
+        if self.forbids:
+            return np.asarray(~np.isin(labels, self.forbids))
+        return np.asarray(labels == self.action)
 
     @property
     def placed(self) -> bool:
@@ -277,12 +307,15 @@ class Thresholds:
         confidence: Minimum confidence.
         lift: Minimum lift.
         max_depth: Longest rule, None without limit.
+        never: Epsilon of its never-rules: most that the upper bound of a forbidden label's share
+            may be; None where there are none.
     """
 
     support: float
     confidence: float
     lift: float = 0.0
     max_depth: int | None = None
+    never: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no rule set can have.
@@ -298,6 +331,11 @@ class Thresholds:
         require(self.lift, Real, "the minimum lift must be a number", "give 0 or more")
         if not (np.isfinite(self.lift) and self.lift >= 0.0):
             raise InputError(f"the minimum lift is {self.lift}; give 0 or more")
+        if self.never is not None and not 0.0 < self.never < 1.0:
+            raise InputError(
+                f"epsilon, the most that a forbidden action's share may be, is {self.never}; give "
+                "a share above 0 and below 1, as 0.1"
+            )
         if self.max_depth is None:
             return
         must = "the maximum depth must be a whole number"

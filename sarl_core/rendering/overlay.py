@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from sarl_core.agents.spaces import Actions
 from sarl_core.decimals import rounded_text
+from sarl_core.mining.action_words import done_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import done_text
 from sarl_core.rendering.canvas import INKS, PAPER_INDEX, TRACK_INDEX, Canvas, fitted, wrapped
 from sarl_core.rendering.film import Film
 from sarl_core.rollouts.steps import StepTable

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -93,10 +94,39 @@ def replacements(
     """
     if dtype.kind == "f" and dtype.itemsize > _FLOAT32.itemsize:
         dtype = _FLOAT32  # each of its numbers is one of the wider kind, too
-    entries = [
-        _of_rule(rule, rule_set.actions[rule.dimension], projection, dtype)
-        for rule in rule_set.rules
-    ]
+    return _together(
+        [
+            _of_rule(rule, rule_set.actions[rule.dimension], projection, dtype)
+            for rule in rule_set.rules
+        ]
+    )
+
+
+def label_replacements(
+    dimension: LabelledDimension, projection: Projection, dtype: np.dtype[Any] = _FLOAT32
+) -> Replacements:
+    """The same for what comes in the place of a forbidden label.
+
+    Args:
+        dimension: Of L labels.
+        projection: How continuous actions are replaced; ``expert`` takes the centre of an interval,
+            as a never-rule holds no value that was shown.
+        dtype: Of the actions that the environment takes.
+
+    Returns:
+        One entry a label, whose values are not numbers where no number of the dtype lies there.
+    """
+    if dtype.kind == "f" and dtype.itemsize > _FLOAT32.itemsize:
+        dtype = _FLOAT32
+    return _together(
+        [
+            _of_label(label, dimension, projection, dtype, None)
+            for label in range(dimension.n_labels)
+        ]
+    )
+
+
+def _together(entries: Sequence[tuple[float, float, float]]) -> Replacements:
     target, low, high = np.array(entries, dtype=np.float64).reshape(-1, 3).T
     return Replacements(target.copy(), low.copy(), high.copy())
 
@@ -104,33 +134,46 @@ def replacements(
 def _of_rule(
     rule: Rule, dimension: LabelledDimension, projection: Projection, dtype: np.dtype[Any]
 ) -> tuple[float, float, float]:
-    if not dimension.is_interval:
-        value = float(dimension.actions[rule.action])
-        return value, value, value
-    lower, upper = dimension.edges[rule.action], dimension.edges[rule.action + 1]
-    last = rule.action == dimension.n_labels - 1
-    if dtype.kind == "f":
-        low, high = _float_range(lower, upper, dtype, last=last)
-    else:
-        low, high = _whole_range(lower, upper, dtype, last=last)
-    if rule.enabled and not low <= high:
+    """Target, low and high of a rule; none of a never-rule, whose target is the state's."""
+    if rule.forbids:
+        return np.nan, np.nan, np.nan
+    undemonstrated = rule.origin == "manual" or not dimension.is_interval
+    if projection == "expert" and rule.demonstrated_value is None and not undemonstrated:
+        raise InputError(
+            f"the rule {rule.id} holds no demonstrated value, which the projection 'expert' needs; "
+            "mine the rules again, or choose centre or clip"
+        )
+    entry = _of_label(rule.action, dimension, projection, dtype, rule.demonstrated_value)
+    if rule.enabled and not entry[1] <= entry[2]:
         raise InputError(
             f"rule {rule.id} asks for {dimension.label_names[rule.action][:60]}, and no number "
             f"of the kind that the environment takes ({dtype}) lies there; mine with a smaller "
             "divider"
         )
+    return entry
+
+
+def _of_label(
+    label: int,
+    dimension: LabelledDimension,
+    projection: Projection,
+    dtype: np.dtype[Any],
+    demonstrated: float | None,
+) -> tuple[float, float, float]:
+    if not dimension.is_interval:
+        value = float(dimension.actions[label])
+        return value, value, value
+    lower, upper = dimension.edges[label], dimension.edges[label + 1]
+    last = label == dimension.n_labels - 1
+    if dtype.kind == "f":
+        low, high = _float_range(lower, upper, dtype, last=last)
+    else:
+        low, high = _whole_range(lower, upper, dtype, last=last)
     if projection == "clip":
         return np.nan, low, high
-    undemonstrated = rule.origin == "manual" and rule.demonstrated_value is None
-    if projection == "centre" or undemonstrated:
-        target = dimension.centre(rule.action)
-    elif rule.demonstrated_value is None:
-        raise InputError(
-            f"the rule {rule.id} holds no demonstrated value, which the projection 'expert' needs; "
-            "mine the rules again, or choose centre or clip"
-        )
-    else:
-        target = rule.demonstrated_value
+    target = dimension.centre(label)
+    if projection == "expert" and demonstrated is not None:
+        target = demonstrated
     # Rounded before it is moved into the interval, and not after: it might fall out of it.
     with np.errstate(over="ignore"):
         rounded = float(dtype.type(target)) if dtype.kind == "f" else float(round(target))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from copy import copy
 from math import isfinite, isnan
-from typing import Any, Literal, NamedTuple, Self, get_args
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +19,11 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import take_back_unanswered
 from sarl_core.shielding.boxes import Boxes, leaves_out
+from sarl_core.shielding.forbidding import Forbidding, first_of, never_rules
 from sarl_core.shielding.matching import Matcher
-from sarl_core.shielding.projection import Projection, replacements
+from sarl_core.shielding.projection import Projection, label_replacements, replacements
 from sarl_core.shielding.readers import ActionForm, ActionReader, StateReader, UnreadableError
+from sarl_core.shielding.record import BatchDecision, Decision
 
 __all__ = ["BatchDecision", "Decision", "OnInvalid", "Outside", "Projection", "Shield"]
 
@@ -32,58 +34,6 @@ OnInvalid = Literal["raise", "pass"]
 
 _RULES = "mine one: mine_rules(...), or load one: load_rules(path)"
 _ARRAY, _FLOAT32 = np.ndarray, np.dtype(np.float32)
-
-
-class Decision(NamedTuple):
-    """What the shield made of one action; the heart of the flight recorder.
-
-    Attributes:
-        executed: The action to execute, in the environment's dtype; where it breaks no rule and
-            has that dtype (and, where the environment is known, that shape) already, the proposed
-            object itself. Where the action is `invalid` and passes, that object, too.
-        proposed: The agent's action.
-        rules: For each action dimension the index of the rule in force, in the rule set's
-            order, or None.
-        intervened: Whether the shield changed the action.
-        margin: Distance of the state to the nearest threshold on the paths walked, in the
-            feature's own unit; inf where there is no threshold, NaN where no path was walked.
-        outside: Whether the state lies outside the data of a rule that the proposed action
-            breaks: of one that changed it, or, where rules abstain, would have.
-        invalid: Why no rule was asked, where the observation is no state or the action none of
-            the space; else None.
-    """
-
-    executed: Any
-    proposed: Any
-    rules: tuple[int | None, ...]
-    intervened: bool
-    margin: float
-    outside: bool = False
-    invalid: str | None = None
-
-
-class BatchDecision(NamedTuple):
-    """What the shield made of B actions.
-
-    Attributes:
-        executed: In the environment's dtype, and in its shape where it is known, else in that
-            of the proposed actions. Where invalid actions pass that this dtype cannot hold,
-            B objects, each as `decide` gives it.
-        proposed: The agent's actions; B objects where they are no array of numbers.
-        rules: Index of the rule in force or -1, (B, m) int64.
-        intervened: Shape (B,).
-        margin: Shape (B,).
-        outside: Shape (B,).
-        invalid: Why no rule was asked, or None, (B,) objects.
-    """
-
-    executed: NDArray[Any]
-    proposed: NDArray[Any]
-    rules: NDArray[np.int64]
-    intervened: NDArray[np.bool_]
-    margin: NDArray[np.float64]
-    outside: NDArray[np.bool_]
-    invalid: NDArray[np.object_]
 
 
 class Shield:
@@ -151,7 +101,7 @@ class Shield:
                 [
                     (index, rule)
                     for index, rule in enumerate(used.rules)
-                    if rule.dimension == dimension and rule.enabled
+                    if rule.dimension == dimension and rule.enabled and not rule.forbids
                 ]
             )
             for dimension in range(len(rule_set.actions))
@@ -161,6 +111,12 @@ class Shield:
         self._boxes = Boxes(used.rules, len(used.source.features))
         self._sides = self._boxes.sides
         self._abstains = outside == "abstain"
+        self._forbidding = tuple(
+            Forbidding(entries, used.rules, action, self._boxes, abstains=self._abstains)
+            if entries
+            else None
+            for action, entries in zip(rule_set.actions, never_rules(used), strict=True)
+        )
         self._states = StateReader(rule_set)
         self._extension = Extension.of(used.source.features)
         self._extends = bool(self._extension.definitions)
@@ -193,6 +149,13 @@ class Shield:
         self._reader = ActionReader(self._actions, form)
         self._replace = replacements(self.rule_set, self.projection, form.dtype)
         self._discrete = bool(form.labels)
+        self._forbidding = tuple(
+            each
+            and each.executing(
+                label_replacements(action, self.projection, form.dtype), discrete=self._discrete
+            )
+            for action, each in zip(self._actions, self._forbidding, strict=True)
+        )
         self._single = len(form.labels) == 1 and form.shape in (None, ())
         self._scalar = form.dtype.type
         self._wanted: list[int] = []
@@ -310,7 +273,15 @@ class Shield:
         """Decide one discrete action, a valid one."""
         rule, margin = self._match_one(0, state) if self._formulas else self._first_match(state)
         if rule is None:
-            return Decision(handed, action, (None,), False, margin)
+            forbidding = self._forbidding[0]
+            if forbidding is None:
+                return Decision(handed, action, (None,), False, margin)
+            rule, changed, near, outside = forbidding.decide(state, value)
+            margin = min(margin, near)
+            if changed == value:
+                return Decision(handed, action, (rule,), False, margin, outside)
+            executed = changed if type(handed) is int else np.full_like(handed, changed)[()]
+            return Decision(executed, action, (rule,), True, margin, outside)
         if value == self._wanted[rule]:
             return Decision(handed, action, (rule,), False, margin)
         sides = self._sides[rule]
@@ -342,10 +313,18 @@ class Shield:
                 self._match_one(dimension, state) if self._formulas else matcher.match(state)
             )
             nearest = min(nearest, margin)
+            value, forbidding = numbers[dimension], self._forbidding[dimension]
+            if rule is None and forbidding is not None:
+                rule, changed, margin, beyond = forbidding.decide(state, value)
+                nearest, outside = min(nearest, margin), outside or beyond
+                rules.append(rule)
+                if changed != value:
+                    executed = values.copy() if executed is None else executed
+                    executed[dimension] = changed
+                continue
             rules.append(rule)
             if rule is None:
                 continue
-            value = numbers[dimension]
             label = self._label_list[rule]
             if self._actions[dimension].label_of(value) != label:
                 sides = self._sides[rule]
@@ -461,6 +440,19 @@ class Shield:
                     else self._replace.many(breaks, column[broken])
                 )
                 intervened[broken] = True
+            forbidding = self._forbidding[dimension]
+            rows = np.flatnonzero(rules[:, dimension] < 0)
+            if forbidding is not None and len(rows):
+                rules[rows, dimension], values, near, beyond = forbidding.decide_many(
+                    np.ascontiguousarray(states[rows]), column[rows]
+                )
+                margin[rows] = np.minimum(margin[rows], near)
+                outside[rows] |= beyond
+                changed = rows[values != column[rows]]
+                if len(changed):
+                    executed = flat.copy() if executed is flat else executed
+                    executed[rows, dimension] = values
+                    intervened[changed] = True
         return executed, rules, intervened, margin, outside
 
     def _match(self, states: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
@@ -493,7 +485,13 @@ class Shield:
         if bad:
             states = states.copy()
             states[bad] = 0.0
-        rules, _ = self._match(self._extension.many(states))
+        states = self._extension.many(states)
+        rules, _ = self._match(states)
+        for dimension, forbidding in enumerate(self._forbidding):
+            rows = np.flatnonzero(rules[:, dimension] < 0)
+            if forbidding is not None and len(rows):
+                forbidden, _ = forbidding.many(np.ascontiguousarray(states[rows]))
+                rules[rows, dimension] = first_of(forbidden)
         rules[bad] = NO_RULE
         return rules
 
@@ -533,17 +531,23 @@ class Shield:
         Returns:
             Shape (B,): the mean over the action dimensions of log(labels still allowed) /
             log(labels): 1 where no rule applies or it abstains, 0 where one label is left, as
-            every rule leaves one.
+            every rule that demands one leaves.
         """
-        free = rules < 0
-        if self._abstains:
-            observations = self._extension.many(observations)
-            for dimension, column in enumerate(rules.T):
-                ruled = np.flatnonzero(column >= 0)
-                free[ruled, dimension] = self._boxes.leave_out(column[ruled], observations[ruled])
+        demands = np.array([not rule.forbids for rule in self._rules] + [False])
+        free = np.where(demands[rules], 0.0, 1.0)
+        if self._abstains or any(self._forbidding):
+            observations = np.ascontiguousarray(self._extension.many(observations))
         for dimension, action in enumerate(self._actions):
+            column, forbidding = rules[:, dimension], self._forbidding[dimension]
+            if self._abstains:
+                ruled = np.flatnonzero(demands[column])
+                beyond = self._boxes.leave_out(column[ruled], observations[ruled])
+                free[ruled[beyond], dimension] = 1.0
             if action.n_labels == 1:  # there was nothing to choose from
-                free[:, dimension] = True
+                free[:, dimension] = 1.0
+            elif forbidding is not None:
+                rows = np.flatnonzero(~demands[column])
+                free[rows, dimension] = forbidding.freedom(np.ascontiguousarray(observations[rows]))
         return np.asarray(free.mean(axis=1))
 
     @property

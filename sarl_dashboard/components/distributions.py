@@ -13,8 +13,9 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.demonstrations import feature_figure
 from sarl_core.explaining.figures.distributions import FeatureRow, feature_row, histogram_by_label
 from sarl_core.explaining.html.step_card import legend
+from sarl_core.mining.action_words import label_text
 from sarl_core.mining.labels import LabelledDimension, label_dimensions
-from sarl_core.mining.language import label_text, share_text
+from sarl_core.mining.language import share_text
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.text import escaped, together

@@ -12,9 +12,9 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.tables.evidence import held_out_columns
 from sarl_core.explaining.tables.rules import rule_columns
 from sarl_core.explaining.words.evidence import VERDICT_COLOURS, VERDICTS
+from sarl_core.mining.action_words import action_text
 from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import action_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_dashboard.components.journey.words import word_help

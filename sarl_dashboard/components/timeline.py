@@ -10,8 +10,8 @@ from markupsafe import Markup
 from sarl_core.explaining.colours import INTERVENTION_COLOUR, label_colour
 from sarl_core.explaining.figures.replay import Timeline
 from sarl_core.explaining.html.step_card import legend
+from sarl_core.mining.action_words import label_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import label_text
 from sarl_dashboard.components.places import placed
 
 

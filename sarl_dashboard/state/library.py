@@ -33,7 +33,7 @@ from sarl_core.library.results import add_result
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.editing.edits import Edit
-from sarl_core.mining.rule_set import RuleSet, rules_digest
+from sarl_core.mining.rule_set import RuleSet, require_demands, rules_digest
 from sarl_core.rollouts.episode_files import episodes_from_json, episodes_to_json
 from sarl_core.rollouts.episodes import Episodes
 from sarl_dashboard.cache import cached
@@ -137,7 +137,9 @@ def stored_rules(item: Item) -> RuleSet:
 @cached(show_spinner="Reading the rules …")
 def _read_rules(identifier: str, digest: str) -> RuleSet:
     opened = library()
-    return rules_of(opened, opened.item(identifier))
+    rule_set = rules_of(opened, opened.item(identifier))
+    require_demands(rule_set, "the dashboard")
+    return rule_set
 
 
 def stored_edits(item: Item, rule_set: RuleSet) -> tuple[Edit, ...]:

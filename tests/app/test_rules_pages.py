@@ -8,7 +8,8 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, load_demonstrations, mine_rules
-from sarl_core.mining.language import action_text, conditions_text
+from sarl_core.mining.action_words import action_text
+from sarl_core.mining.language import conditions_text
 from sarl_core.mining.rules import Rule
 from sarl_core.shipped import DATA
 from tests.app.screens import open_page, texts

@@ -23,7 +23,7 @@ from sarl_core.demonstrations.formats import read_demonstrations
 from sarl_core.explaining.exports.vectors import make_vectors
 from sarl_core.explaining.figures.demonstrations import action_figure
 from sarl_core.explaining.figures.distributions import interval_histogram
-from sarl_core.mining.language import action_text, label_text
+from sarl_core.mining.action_words import action_text, label_text
 from sarl_core.mining.quantisation import quantise
 from tests.bad_inputs import csv_bytes
 from tests.explaining.exported import agree, expected, run_c, run_onnx, run_python

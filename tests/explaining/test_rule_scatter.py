@@ -18,8 +18,9 @@ from sarl_core.explaining.figures.rules.scatter import (
     rule_dots,
     rule_scatter,
 )
+from sarl_core.mining.action_words import action_text
 from sarl_core.mining.evidence import HeldOut
-from sarl_core.mining.language import action_text, merged_length, sentence
+from sarl_core.mining.language import merged_length, sentence
 from sarl_core.mining.rules import Rule
 
 BY_TITLE = {measure.title: measure for measure in MEASURES}

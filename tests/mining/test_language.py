@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sarl_core.demonstrations.dataset import Feature
+from sarl_core.mining.action_words import action_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import (
-    action_text,
     condition_text,
     conditions_text,
     limit_text,

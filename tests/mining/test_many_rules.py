@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, Rule, RuleSet, mine_rules
 from sarl_core.explaining.exports.export import rules_to_csv
-from sarl_core.mining import rule_files
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.language import Wording, conditions_text, merged_length, sentence
-from sarl_core.mining.rule_files import rule_document
+from sarl_core.mining.rule_files import writing
+from sarl_core.mining.rule_files.writing import rule_document
 from sarl_core.mining.rule_set import exact_texts, rules_to_json
 from sarl_core.mining.rules import Bounds, Condition, along_paths, share_bounds
 
@@ -129,7 +129,7 @@ def of_many(rule: Rule) -> str:
     labels = np.array([0, 1, 0, 1])
     mined = mine_rules(Demonstrations(states, labels, np.arange(4)), supp_min=0.0, conf_min=0.0)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(rule_files, "_MOST_CONDITIONS", -1)
+        patch.setattr(writing, "_MOST_CONDITIONS", -1)
         return rules_to_json(replace(mined, rules=(rule,)))
 
 

@@ -130,6 +130,7 @@ RULE_CHANGES: dict[str, Callable[[Rule], Any]] = {
     "pinned": lambda rule: not rule.pinned,
     "box": lambda rule: BOX,
     "held_out": lambda rule: HeldOut(96, 87, 14, 0.91, 0.78, 0.99),
+    "forbids": lambda rule: (rule.action,),
 }
 SET_CHANGES: dict[str, Callable[[RuleSet], Any]] = {
     "rules": lambda rules: rules.rules[::-1],
@@ -145,7 +146,8 @@ SET_CHANGES: dict[str, Callable[[RuleSet], Any]] = {
 @settings(max_examples=60)
 @given(st.data())
 def test_whatever_changes_changes_the_digest(rules: RuleSet, data: st.DataObject) -> None:
-    assert list(RULE_CHANGES) == [field.name for field in fields(Rule)]
+    # What comes in the place of something is said by rules that forbid, and by no others.
+    assert [*RULE_CHANGES, "instead"] == [field.name for field in fields(Rule)]
     assert list(SET_CHANGES) == [field.name for field in fields(RuleSet)]
     if data.draw(st.booleans()):
         name = data.draw(st.sampled_from(sorted(SET_CHANGES)))
@@ -158,6 +160,14 @@ def test_whatever_changes_changes_the_digest(rules: RuleSet, data: st.DataObject
     assert changed != rules
     assert changed.digest != rules.digest
     assert rules_digest(changed) != rules_digest(rules)
+
+
+def test_so_does_what_comes_in_the_place_of_what_is_forbidden(rules: RuleSet) -> None:
+    orders = [(1, 2, 3), (2, 1, 3)]
+    first, other = (
+        replace(rules, rules=(replace(rules[0], forbids=(0,), instead=order),)) for order in orders
+    )
+    assert first.digest != other.digest
 
 
 @pytest.mark.parametrize(

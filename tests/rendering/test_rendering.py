@@ -15,9 +15,10 @@ from PIL import Image, ImageSequence
 from sarl_core.decimals import rounded_text
 from sarl_core.environments.description import describe_environment
 from sarl_core.errors import InputError
+from sarl_core.mining.action_words import done_text
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.environment_actions import environment_dimensions
-from sarl_core.mining.language import done_text, sentence
+from sarl_core.mining.language import sentence
 from sarl_core.progress import CancelledError
 from sarl_core.rendering.canvas import INKS, OVERLAY_COLOURS, fitted, text_width, wrapped
 from sarl_core.rendering.overlay import BOTTOM, GAP, TOP

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sarl_core.mining.tree import PolicyTree
     from sarl_core.mining.validation.cross_fitting import Judged
     from sarl_core.rendering.replay import Replay
+    from sarl_core.shielding.leeway import Leeway
     from sarl_core.shielding.shield import Shield
 
 _MOST_RULES = 5
@@ -276,7 +277,11 @@ def _numbers(spread: dict[str, float]) -> tuple[str, str, str]:
 
 
 def describe_rules(
-    rule_set: RuleSet, path: Path, tried: Tried | None = None, judged: Judged | None = None
+    rule_set: RuleSet,
+    path: Path,
+    tried: Tried | None = None,
+    judged: Judged | None = None,
+    leeway: Leeway | None = None,
 ) -> dict[str, Any]:
     """What was mined, without the rules themselves.
 
@@ -285,6 +290,7 @@ def describe_rules(
         path: Their file, or what several are called together.
         tried: Which episodes were held out, if any were.
         judged: What the rules are worth elsewhere, if that was asked.
+        leeway: What never-rules say of what they were mined from.
 
     Returns:
         A document for JSON.
@@ -301,13 +307,15 @@ def describe_rules(
             "confidence": thresholds.confidence,
             "lift": thresholds.lift,
             "max_depth": thresholds.max_depth,
+            **({} if thresholds.never is None else {"never": thresholds.never}),
         },
         "divider": rule_set.divider,
         "learner": rule_set.learner,
         "rules": rule_set.rule_count,
         "mean_length": rule_set.mean_length,
-        "coverage": rule_set.coverage,
-        "fidelity": rule_set.fidelity,
+        "coverage": (leeway or rule_set).coverage,
+        "fidelity": (leeway or rule_set).fidelity,
+        **({} if leeway is None else {"freedom": leeway.freedom}),
         "rules_per_dimension": {
             action.name: len(rule_set.of_dimension(index))
             for index, action in enumerate(rule_set.actions)
@@ -336,6 +344,7 @@ def print_rules(
     judged: Judged | None = None,
     *,
     elsewhere: str = "--cross-fit",
+    leeway: Leeway | None = None,
 ) -> None:
     """Print what was mined, and the rules that apply most often, in words.
 
@@ -345,6 +354,7 @@ def print_rules(
         tried: Which episodes were held out, if any were.
         judged: What the rules are worth elsewhere, if that was asked.
         elsewhere: The option that would say it.
+        leeway: What never-rules say of what they were mined from.
     """
     from sarl_core.cli.answers.evidence import (
         judged_facts,
@@ -358,9 +368,17 @@ def print_rules(
     facts = [
         ("rules", f"{rule_set.rule_count:,}"),
         ("mean length", f"{rule_set.mean_length:.2f} conditions"),
-        ("coverage", f"{share_text(rule_set.coverage)} of the demonstrated states have a rule"),
+        (
+            "coverage",
+            f"{share_text((leeway or rule_set).coverage)} of the demonstrated states have a rule",
+        ),
     ]
-    if len(rule_set):
+    if leeway is not None:
+        facts += [
+            ("fidelity", f"{share_text(leeway.fidelity)} of these are as the rules say"),
+            ("freedom", f"{share_text(leeway.freedom)} of the choice is left there"),
+        ]
+    elif len(rule_set):
         facts.append(
             ("fidelity", f"{share_text(rule_set.fidelity)} of these carry the rule's action")
         )
@@ -373,7 +391,7 @@ def print_rules(
     others = [one for one in (judged, tried and tried.judged) if one is not None]
     warnings = [text for one in others if (text := parting_text(rule_set.fidelity, one))]
     terminal.print_lines([f"warning: {text}" for text in warnings[:1]])
-    if not others and len(rule_set):
+    if not others and len(rule_set) and leeway is None:
         terminal.print_lines(
             [
                 "Coverage and fidelity are of the states that the rules were mined from, which "

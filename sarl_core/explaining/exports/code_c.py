@@ -18,7 +18,8 @@ from sarl_core.explaining.exports.program import (
     state_lines,
 )
 from sarl_core.explaining.words.sign_off import SignOff
-from sarl_core.mining.language import action_text, conditions_text, counted, one_line
+from sarl_core.mining.action_words import says_text
+from sarl_core.mining.language import conditions_text, counted, one_line
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import Rule
@@ -373,7 +374,7 @@ def _number(value: float) -> str:
 
 
 def _rule_comment(rule: Rule, rule_set: RuleSet) -> str:
-    action = action_text(rule.action, rule_set.actions[rule.dimension])
+    action = says_text(rule, rule_set.actions[rule.dimension])
     return comment(f"{rule_set.name_of(rule)}: {action}")
 
 

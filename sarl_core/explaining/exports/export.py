@@ -20,13 +20,10 @@ from sarl_core.explaining.exports.program import require_rules
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cell
 from sarl_core.explaining.words.sign_off import SignOff
 from sarl_core.files import as_path, whole_file
+from sarl_core.mining.action_words import says_label
 from sarl_core.mining.editing.rounding import Rounding, merged_rules, rounded_rules
 from sarl_core.mining.evidence import HeldOut
-from sarl_core.mining.language import (
-    Wording,
-    counted,
-    label_text,
-)
+from sarl_core.mining.language import Wording, counted
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet, exact_texts
 from sarl_core.shielding.projection import Projection
@@ -325,7 +322,7 @@ def rules_to_csv(rule_set: RuleSet) -> str:
         cells = (
             safe_cell(rule.id),
             safe_cell(dimension.name),
-            safe_cell(label_text(rule.action, dimension)),
+            safe_cell(says_label(rule, dimension)),
             safe_cell(wording.sentence(rule, evidence=False)),
             safe_cell(conditions),
             repr(rule.support),

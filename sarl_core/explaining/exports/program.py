@@ -21,7 +21,7 @@ from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import one_line
 from sarl_core.mining.rule_order import without_idle
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rule_set import RuleSet, require_demands
 from sarl_core.mining.rule_tree import NO_RULE, NOTHING, Numbered, RuleNode, tree_of
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import LEAF
@@ -222,6 +222,7 @@ def program_of(
             demonstrated values.
     """
     require_rules(rule_set)
+    require_demands(rule_set, "code for other programs")
     if not any(rule.enabled for rule in rule_set.rules):
         raise InputError(
             "every rule of the rule set is switched off, so there is nothing to export; switch "

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.html.rule_matrix import PLACED_LEGEND, PLACED_MARK, RuleMatrix
-from sarl_core.mining.language import label_text, number_text, one_line, share_text
+from sarl_core.mining.action_words import says_label
+from sarl_core.mining.language import number_text, one_line, share_text
 from sarl_core.mining.rules import Rule
 from sarl_core.rendering.canvas import shipped_font
 
@@ -65,10 +66,10 @@ def matrix_png(matrix: RuleMatrix, rules: Sequence[Rule]) -> bytes:
     for number, rule in enumerate(rules):
         top = _MARGIN + _HEAD + number * _ROW
         box(_MARGIN, top, width - _MARGIN, top + 0.5, _LINE)
-        colour = label_colour(rule.action)
+        colour = label_colour(rule.label)
         dimension = matrix.rule_set.actions[rule.dimension]
         box(_MARGIN, top + 6, _MARGIN + 9, top + 15, colour)
-        label = label_text(rule.action, dimension)
+        label = says_label(rule, dimension)
         if len(matrix.rule_set.actions) > 1 or dimension.is_interval:
             label = f"{dimension.name}: {label}"
         label = f"{PLACED_MARK}{label}" if rule.placed else label

@@ -11,7 +11,8 @@ from sarl_core.explaining.colours import INTERVENTION_COLOUR, MUTED_COLOUR
 from sarl_core.explaining.figures.replay import SHIELDED_COLOUR
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
-from sarl_core.mining.language import action_text, conditions_text, counted
+from sarl_core.mining.action_words import says_text
+from sarl_core.mining.language import conditions_text, counted
 from sarl_core.studies.ablation import VERDICTS, Ablation, RuleEffect, Verdict
 
 VERDICT_COLOURS: dict[Verdict, str] = {
@@ -52,7 +53,7 @@ def ablation_columns(ablation: Ablation) -> dict[str, list[object]]:
     known = ablation.failures_known
     return {
         "Rule": [rule_set.name_of(rule) for rule in rules],
-        "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
+        "Action": [says_text(rule, rule_set.actions[rule.dimension]) for rule in rules],
         "Verdict": [effect.verdict.capitalize() for effect in ablation.effects],
         "Return without it": [effect.difference.mean for effect in ablation.effects],
         "95 % interval": [difference_interval_text(effect) for effect in ablation.effects],
@@ -213,7 +214,7 @@ def _hover(ablation: Ablation, effect: RuleEffect) -> str:
     rule = rule_set.rules[effect.rule]
     lines = [
         f"<b>{rule_set.name_of(rule)}: "
-        f"{plain(action_text(rule.action, rule_set.actions[rule.dimension]))}</b>",
+        f"{plain(says_text(rule, rule_set.actions[rule.dimension]))}</b>",
         f"{difference_text(effect.difference.mean)} without it, 95 % interval "
         f"{difference_interval_text(effect)}",
         effect.verdict,

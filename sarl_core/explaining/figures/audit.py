@@ -19,7 +19,7 @@ from sarl_core.explaining.figures.replay import Timeline, Track
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.ticks import round_ticks, tick_text
-from sarl_core.mining.language import label_text
+from sarl_core.mining.action_words import label_text, says_label
 
 _ROW_HEIGHT = 84  # pixels, of a feature
 _NO_OR_YES = {"tickvals": [0, 1], "ticktext": ["no", "yes"]}
@@ -77,7 +77,7 @@ def step_texts(audit: Audit, rows: slice) -> list[str]:
                 parts.append(f"{done}, no rule")
                 continue
             rule = rule_set[place]
-            said = label_text(rule.action, dimension)
+            said = says_label(rule, dimension)
             parts.append(f"{done}; {rule_set.name_of(rule)} says {said}")
         texts.append(f"step {audit.log.steps[row]}: {', '.join(parts)}")
     return texts

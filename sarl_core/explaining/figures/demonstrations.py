@@ -15,8 +15,9 @@ from sarl_core.explaining.colours import MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.figures.distributions import EpisodeSeries, Histogram
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
+from sarl_core.mining.action_words import label_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import label_text, number_text
+from sarl_core.mining.language import number_text
 
 FEATURE_HEIGHT = 170
 ACTION_HEIGHT = 210

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from sarl_core.explaining.colours import MARKER_COLOUR, MUTED_COLOUR, faded, label_colour
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
+from sarl_core.mining.action_words import label_text
 from sarl_core.mining.digits import limit_text
-from sarl_core.mining.language import label_text, query_text, share_text
+from sarl_core.mining.language import query_text, share_text
 from sarl_core.mining.rules import Condition
 from sarl_core.mining.tree import LEAF, PolicyTree
 

@@ -17,8 +17,9 @@ from sarl_core.explaining.words.evidence import (
     held_out_interval_text,
     verdict_counts,
 )
+from sarl_core.mining.action_words import says_text
 from sarl_core.mining.evidence import Interval
-from sarl_core.mining.language import action_text, counted, share_text
+from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.holding_out import verdict
@@ -105,7 +106,7 @@ def _within(share: float, interval: Interval) -> str:
 
 
 def _tip(rule: Rule, rule_set: RuleSet) -> str:
-    does = action_text(rule.action, rule_set.actions[rule.dimension])
+    does = says_text(rule, rule_set.actions[rule.dimension])
     lines = (
         f"{rule_set.name_of(rule)}: {does}",
         evidence_text(rule),

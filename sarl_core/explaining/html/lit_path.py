@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.state_path import PathFinder, StatePath
 from sarl_core.explaining.templates import render
+from sarl_core.mining.action_words import says_text
 from sarl_core.mining.digits import value_text
-from sarl_core.mining.language import action_text, bounds_of, number_text, query_text
+from sarl_core.mining.language import bounds_of, number_text, query_text
 from sarl_core.mining.rule_set import RuleSet
 
 
@@ -56,8 +57,8 @@ def lit_path_table(path: StatePath, rule_set: RuleSet, dimension: int) -> Markup
         "rules/lit_path",
         queries=queries,
         rule=rule and rule_set.name_of(rule),
-        action=rule and action_text(rule.action, rule_set.actions[dimension]),
-        colour=rule and label_colour(rule.action),
+        action=rule and says_text(rule, rule_set.actions[dimension]),
+        colour=rule and label_colour(rule.label),
     )
 
 

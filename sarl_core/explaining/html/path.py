@@ -10,8 +10,9 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.markup import percent
 from sarl_core.explaining.tables.rule_evidence import PathStep
 from sarl_core.explaining.templates import render
+from sarl_core.mining.action_words import label_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import label_text, share_text
+from sarl_core.mining.language import share_text
 
 
 def label_key(dimension: LabelledDimension) -> list[tuple[str, str]]:

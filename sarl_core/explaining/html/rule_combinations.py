@@ -18,8 +18,9 @@ from sarl_core.explaining.combination_plots import CombinationPlot, Point
 from sarl_core.explaining.html.plot import Axis, Part, Scale, plot
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.ticks import round_ticks, tick_text
+from sarl_core.mining.action_words import label_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import condition_text, label_text, short_condition
+from sarl_core.mining.language import condition_text, short_condition
 
 MOST = 6  # combinations of one rule
 _SIZE = 1000  # of the picture, which is stretched to the plot

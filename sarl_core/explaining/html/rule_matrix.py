@@ -16,10 +16,9 @@ from markupsafe import Markup
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.templates import render, style_sheet
+from sarl_core.mining.action_words import action_text, label_text
 from sarl_core.mining.language import (
-    action_text,
     counted,
-    label_text,
     least_bounds,
     number_text,
     share_text,
@@ -222,7 +221,7 @@ class _MatrixRow(NamedTuple):
 
 
 def _row(matrix: RuleMatrix, rule: Rule) -> _MatrixRow:
-    bars, colour = matrix.bars(rule), label_colour(rule.action)
+    bars, colour = matrix.bars(rule), label_colour(rule.label)
     cells = [("", "")] * len(matrix.columns)
     for place, column in enumerate(matrix.columns):
         if bar := bars.get(column.feature):

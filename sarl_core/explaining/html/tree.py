@@ -24,7 +24,8 @@ from sarl_core.explaining.figures.tree import (
 from sarl_core.explaining.markup import percent
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.ticks import round_ticks, tick_text
-from sarl_core.mining.language import counted, label_text
+from sarl_core.mining.action_words import label_text
+from sarl_core.mining.language import counted
 from sarl_core.mining.tree import PolicyTree
 
 _HIT = 8.0  # pixels: what is narrower is not met by the pointer

@@ -21,7 +21,8 @@ from sarl_core.explaining.words.what_if import (
     outside_texts,
     with_unit,
 )
-from sarl_core.mining.language import action_text, counted, number_text, sentence
+from sarl_core.mining.action_words import says_text
+from sarl_core.mining.language import counted, number_text, sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.shielding.neighbourhood import DecisionChange, FeatureChange, NearMiss
@@ -197,7 +198,7 @@ def _miss_row(miss: NearMiss, rule_set: RuleSet) -> tuple[str, ...]:
     features = rule_set.source.features
     return (
         rule_set.name_of(rule),
-        action_text(rule.action, rule_set.actions[rule.dimension]),
+        says_text(rule, rule_set.actions[rule.dimension]),
         near_miss_text(miss.changes, features),
         number_text(miss.distance),
         _yes(miss.in_force),

@@ -16,8 +16,9 @@ from sarl_core.explaining.markup import percent
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.states import StateColumn, state_columns
 from sarl_core.explaining.words.what_if import with_unit
+from sarl_core.mining.action_words import label_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import label_text, number_text
+from sarl_core.mining.language import number_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.neighbourhood import FeatureLine
 

@@ -17,8 +17,9 @@ from sarl_core.explaining.figures.distributions import FeatureRow, episode_serie
 from sarl_core.explaining.report.svg import MUTED, NEUTRAL, columns, share_bar
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.explaining.words.states import state_columns, word_shares
+from sarl_core.mining.action_words import label_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import counted, label_text, number_text, share_text
+from sarl_core.mining.language import counted, number_text, share_text
 from sarl_core.mining.rule_set import RuleSet
 
 _FEW_LABELS = 9  # as rows with their names; more are columns side by side

@@ -36,7 +36,7 @@ from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.language import counted, merged_length, share_text
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rule_set import RuleSet, require_demands
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import cross_fit
 from sarl_core.progress import Progress
@@ -177,6 +177,7 @@ def make_report(
     """
     call = "call make_report(rules, demonstrations)"
     require(rule_set, RuleSet, "what a report is about must be a RuleSet", call)
+    require_demands(rule_set, "the report")
     must = "what a report shows the rules on must be Demonstrations"
     require(demonstrations, Demonstrations, must, call)
     wishes = Wishes(

@@ -20,12 +20,11 @@ from sarl_core.explaining.html.rule_combinations import combinations_html
 from sarl_core.explaining.report.svg import SvgScale, evidence_bar, interval_bar
 from sarl_core.explaining.report.tally import Share, Tally
 from sarl_core.explaining.words.evidence import what_tells
+from sarl_core.mining.action_words import done_text, says_text
 from sarl_core.mining.digits import value_text
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.language import (
-    action_text,
     counted,
-    done_text,
     is_flag,
     least_conditions,
     neither_text,
@@ -156,8 +155,8 @@ def rule_card(
     return Card(
         name=rule_set.name_of(rule),
         title=sentence(rule, rule_set, evidence=False),
-        colour=label_colour(rule.action),
-        action=action_text(rule.action, dimension),
+        colour=label_colour(rule.label),
+        action=says_text(rule, dimension),
         tags=tags(rule),
         support=_support(rule, applying, decided, tally),
         evidence=_evidence(rule, rule_set, index, tally, applying),

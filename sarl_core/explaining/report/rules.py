@@ -11,7 +11,8 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import feature_rows
 from sarl_core.explaining.report.rule_cards import Card, rule_card, tags
 from sarl_core.explaining.report.tally import Tally
-from sarl_core.mining.language import action_text, conditions_text, counted, share_text
+from sarl_core.mining.action_words import says_text
+from sarl_core.mining.language import conditions_text, counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.rendering.example_frames import Examples
@@ -210,8 +211,8 @@ def _line(rule_set: RuleSet, index: int) -> RuleLine:
     rule = rule_set.rules[index]
     return RuleLine(
         name=rule_set.name_of(rule),
-        action=action_text(rule.action, rule_set.actions[rule.dimension]),
-        colour=label_colour(rule.action),
+        action=says_text(rule, rule_set.actions[rule.dimension]),
+        colour=label_colour(rule.label),
         when=conditions_text(rule, rule_set),
         support=share_text(rule.support),
         samples=f"{rule.samples:,}",

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.words.difference import said_text, what_text
 from sarl_core.explaining.words.states import state_columns
-from sarl_core.mining.language import action_text, conditions_text, label_text
+from sarl_core.mining.action_words import label_text, says_text
+from sarl_core.mining.language import conditions_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import Rule
@@ -54,8 +55,7 @@ def rule_rows(disagreement: Disagreement, kinds: tuple[str, ...] = KINDS) -> dic
         "What": [kind for kind, *_ in entries],
         "Rule": [rule_set.name_of(rule) for _, rule, rule_set, _ in entries],
         "Action": [
-            action_text(rule.action, rule_set.actions[rule.dimension])
-            for _, rule, rule_set, _ in entries
+            says_text(rule, rule_set.actions[rule.dimension]) for _, rule, rule_set, _ in entries
         ],
         "When": [conditions_text(rule, rule_set) for _, rule, rule_set, _ in entries],
         "Change": [text for *_, text in entries],

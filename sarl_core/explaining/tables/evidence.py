@@ -16,8 +16,9 @@ from sarl_core.explaining.words.evidence import (
     more_text,
     moved_text,
 )
+from sarl_core.mining.action_words import label_text, says_text
 from sarl_core.mining.labels import label_dimensions
-from sarl_core.mining.language import action_text, conditions_text, label_text
+from sarl_core.mining.language import conditions_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.contradictions import Contradictions, EpisodeContradictions
@@ -71,7 +72,7 @@ def enough_columns(
     """
     return {
         "Rule": [rule_set.name_of(rule) for rule in rules],
-        "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
+        "Action": [says_text(rule, rule_set.actions[rule.dimension]) for rule in rules],
         "Still missing": [more_text(more) for more in missing],
         "Held out": [held_out_text(rule.held_out) for rule in rules],
         "Interval": [held_out_interval_text(rule.held_out) for rule in rules],
@@ -96,7 +97,7 @@ def stability_columns(rules: Sequence[Rule], rule_set: RuleSet, stability: Stabi
     features = rule_set.source.features
     return {
         "Rule": [rule_set.name_of(rule) for rule in rules],
-        "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
+        "Action": [says_text(rule, rule_set.actions[rule.dimension]) for rule in rules],
         "Comes back": [100 * one.returns for one in stability.rules],
         "Overlap": [100 * one.overlap for one in stability.rules],
         "States": [rule.samples for rule in rules],

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.derived import extend
 from sarl_core.explaining.words.states import state_columns
+from sarl_core.mining.action_words import done_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import counted, done_text
+from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rollouts.step_filters import StepFilter
 from sarl_core.rollouts.steps import StepTable

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.splits import written_value
 from sarl_core.explaining.words.states import state_columns
+from sarl_core.mining.action_words import label_text
 from sarl_core.mining.digits import limit_texts
-from sarl_core.mining.language import label_text, least_bounds, number_text, query_text
+from sarl_core.mining.language import least_bounds, number_text, query_text
 from sarl_core.mining.rules import Bounds, Condition, Rule, node_of
 from sarl_core.mining.tree import PolicyTree
 

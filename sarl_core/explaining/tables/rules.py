@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sarl_core.mining.action_words import says_text
 from sarl_core.mining.algorithm_1 import cut_nodes, rules_at
-from sarl_core.mining.language import action_text, conditions_text
+from sarl_core.mining.language import conditions_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds, name_at
 from sarl_core.mining.tree import PolicyTree, source_of
@@ -79,7 +80,7 @@ def rule_columns(rules: Sequence[Rule], rule_set: RuleSet) -> dict[str, list[obj
         return value if rule.samples else math.nan
 
     return {
-        "Action": [action_text(rule.action, rule_set.actions[rule.dimension]) for rule in rules],
+        "Action": [says_text(rule, rule_set.actions[rule.dimension]) for rule in rules],
         "When": [conditions_text(rule, rule_set) for rule in rules],
         "Support": [100 * rule.support for rule in rules],
         "Confidence": [mined_value(rule, 100 * rule.confidence) for rule in rules],

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from sarl_core.mining.action_words import label_text, says_text
 from sarl_core.mining.editing.difference import RuleChange
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import (
-    action_text,
     conditions_text,
     counted,
     exact_condition,
-    label_text,
     sentence,
     share_text,
 )
@@ -61,8 +60,8 @@ def what_text(change: RuleChange, difference: Disagreement, *, beside: bool = Fa
         parts.append(f"was {was}" if beside else f"{now} instead of {was}")
     if "action" in what:
         dimension = difference.first.actions[before.dimension]
-        earlier = action_text(before.action, dimension)
-        says = action_text(after.action, difference.second.actions[after.dimension])
+        earlier = says_text(before, dimension)
+        says = says_text(after, difference.second.actions[after.dimension])
         parts.append(f"said {earlier}" if beside else f"{says} instead of {earlier}")
     if "switched" in what:
         parts.append(f"switched {'on' if after.enabled else 'off'}")

@@ -2,16 +2,9 @@
 
 from __future__ import annotations
 
+from sarl_core.mining.action_words import says_label, says_text
 from sarl_core.mining.editing.edits import Add, Edit, Move, Pin, Regrow, Remove, Switch, Unpin
-from sarl_core.mining.language import (
-    action_text,
-    conditions_text,
-    counted,
-    label_text,
-    query_text,
-    sentence,
-    share_text,
-)
+from sarl_core.mining.language import conditions_text, counted, query_text, sentence, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.shielding.effects import Conflict, EditEffect, Verdicts
@@ -127,7 +120,7 @@ def conflict_text(conflict: Conflict, rule_set: RuleSet, *, states: str) -> str:
     """
     rule, other = rule_set.rules[conflict.rule], rule_set.rules[conflict.other]
     dimension = rule_set.actions[rule.dimension]
-    labels = [label_text(one.action, dimension) for one in (rule, other)]
+    labels = [says_label(one, dimension) for one in (rule, other)]
     name, other_name = rule_set.name_of(rule), rule_set.name_of(other)
     text = (
         f"{name} ({labels[0]}) takes {counted(conflict.states, states)} from "
@@ -151,5 +144,5 @@ def rule_name(rule: Rule, rule_set: RuleSet) -> str:
     Returns:
         As "R12: pole angle > 0.02 rad → push right".
     """
-    does = action_text(rule.action, rule_set.actions[rule.dimension])
+    does = says_text(rule, rule_set.actions[rule.dimension])
     return f"{rule_set.name_of(rule)}: {conditions_text(rule, rule_set)} → {does}"

@@ -17,9 +17,10 @@ from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.words.states import state_columns
+from sarl_core.mining.action_words import done_text
 from sarl_core.mining.digits import value_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import done_text, number_text, sentence
+from sarl_core.mining.language import number_text, sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.rollouts.steps import StepTable
@@ -158,7 +159,7 @@ def step_view(
                 rule_name=rule_set.name_of(rule_set.rules[rule]) if known and rule_set else "",
                 abstains=known
                 and rule_set is not None
-                and dimension.label_of(float(executed)) != rule_set.rules[rule].action,
+                and not rule_set.rules[rule].obeyed_by(dimension.labels_of(executed)).all(),
             )
         )
     in_force = steps.rules[row].tolist() if rule_set is not None else []

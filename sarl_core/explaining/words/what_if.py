@@ -13,11 +13,11 @@ from sarl_core.decimals import decimal_text, float32_decimal
 from sarl_core.demonstrations.dataset import Feature
 from sarl_core.demonstrations.derived import extend
 from sarl_core.demonstrations.words import columns_of_words
+from sarl_core.mining.action_words import done_text
 from sarl_core.mining.algorithm_1 import rules_at
 from sarl_core.mining.digits import value_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import (
-    done_text,
     is_flag,
     least_conditions,
     neither_text,

@@ -23,7 +23,7 @@ from sarl_core.errors import InputError
 from sarl_core.mining.editing.manual_rules import region_of
 from sarl_core.mining.editing.shared_words import in_shared_words
 from sarl_core.mining.rule_order import Fitted, fitted_rules
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rule_set import RuleSet, require_demands
 from sarl_core.mining.rules import Rule
 
 What = Literal["conditions", "action", "switched", "place", "origin"]
@@ -80,6 +80,8 @@ def comparable(first: RuleSet, second: RuleSet) -> Fitted:
     Raises:
         InputError: If their features, actions or intervals differ.
     """
+    for each in (first, second):
+        require_demands(each, "the comparison of two rule sets")
     known = first.source.env_id != "" and first.source.env_id == second.source.env_id
     observed = [observed_features(each.source.features) for each in (first, second)]
     if len(observed[0]) != len(observed[1]):

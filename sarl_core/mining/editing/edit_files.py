@@ -19,7 +19,8 @@ from sarl_core.mining.editing.edits import (
     Switch,
     Unpin,
 )
-from sarl_core.mining.rule_files import DocumentPart, RuleDocument, each, rule_document
+from sarl_core.mining.rule_files.reading import DocumentPart, RuleDocument, each
+from sarl_core.mining.rule_files.writing import rule_document
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.applications import applications, labels_of
 from sarl_core.mining.evidence import EpisodeCounts, Integers
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rule_set import RuleSet, obeying_labels
 from sarl_core.mining.tree import PolicyTree
 
 
@@ -35,8 +35,8 @@ def count_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> EpisodeCou
     labels = labels_of(rule_set, demonstrations)
     applied = applications(rule_set, demonstrations.observations)
     dimension = np.array([rule.dimension for rule in rule_set.rules], dtype=np.int64)
-    says = np.array([rule.action for rule in rule_set.rules], dtype=np.int64)
-    right = labels[applied.row, dimension[applied.rule]] == says[applied.rule]
+    obeying = obeying_labels(rule_set)
+    right = obeying[applied.rule, labels[applied.row, dimension[applied.rule]]]
     return count_applied(len(rule_set.rules), applied.rule, applied.row, right, demonstrations)
 
 

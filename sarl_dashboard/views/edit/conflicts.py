@@ -8,7 +8,7 @@ import streamlit as st
 
 from sarl_core.explaining.words.edits import conflict_text
 from sarl_core.explaining.words.states import state_columns
-from sarl_core.mining.language import action_text
+from sarl_core.mining.action_words import says_text
 from sarl_core.shielding.effects import Verdicts
 from sarl_dashboard.components.tables import table_height
 from sarl_dashboard.state import edits
@@ -55,7 +55,7 @@ def _conflict_rows(of: Base, verdicts: Verdicts) -> dict[str, list[Any]]:
         for who, says, at in (("Rule", "Says", one.rule), ("Takes from", "Which says", one.other)):
             rule = rule_set.rules[at]
             rows[who].append(rule_set.name_of(rule))
-            rows[says].append(action_text(rule.action, rule_set.actions[rule.dimension]))
+            rows[says].append(says_text(rule, rule_set.actions[rule.dimension]))
     if basis.expert is not None:
         rows["Expert as the rule"] = [one.right for one in verdicts.conflicts]
         rows["Expert as the other"] = [one.other_right for one in verdicts.conflicts]

@@ -13,9 +13,10 @@ import streamlit as st
 
 from sarl_core.errors import SarlError
 from sarl_core.explaining.words.edits import conflict_text, edits_change_text
+from sarl_core.mining.action_words import action_text
 from sarl_core.mining.editing.edits import Add, Change, next_manual_id
 from sarl_core.mining.editing.manual_rules import Ask, asks_of, manual_rule
-from sarl_core.mining.language import action_text, number_text, sentence
+from sarl_core.mining.language import number_text, sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Operator, Rule
 from sarl_core.shielding.effects import Verdicts, change

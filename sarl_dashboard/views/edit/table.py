@@ -11,8 +11,9 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.explaining.words.edits import state_text
+from sarl_core.mining.action_words import says_text
 from sarl_core.mining.editing.edits import Edit, apply
-from sarl_core.mining.language import action_text, conditions_text, counted
+from sarl_core.mining.language import conditions_text, counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.shielding.effects import Verdicts
@@ -176,7 +177,7 @@ def _texts(rule_set: RuleSet) -> dict[str, tuple[str, str]]:
 
 
 def _text(rule: Rule, rule_set: RuleSet) -> tuple[str, str]:
-    does = action_text(rule.action, rule_set.actions[rule.dimension])
+    does = says_text(rule, rule_set.actions[rule.dimension])
     return does, conditions_text(rule, rule_set)
 
 

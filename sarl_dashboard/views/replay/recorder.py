@@ -23,7 +23,7 @@ from sarl_core.explaining.tables.recorder import (
     place_of,
     recorder_columns,
 )
-from sarl_core.mining.language import action_text
+from sarl_core.mining.action_words import action_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.step_filters import StepFilter, used_rules
 from sarl_core.rollouts.steps import StepTable

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sarl_core.explaining.exports.export import rules_to_csv
 from sarl_core.explaining.words.evidence import remedy_text, shortfall_text
-from sarl_core.mining.language import action_text
+from sarl_core.mining.action_words import action_text
 from sarl_core.mining.rule_set import RuleSet, rules_to_json
 from sarl_core.mining.validation.holding_out import lower_bound, shortfall, with_lower_bound
 from sarl_dashboard.cache import cached

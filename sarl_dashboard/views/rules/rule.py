@@ -136,7 +136,7 @@ def features_of(tree: PolicyTree, rule: Rule, demonstrations: Demonstrations) ->
     parts = []
     if rule.conditions:
         evidence = feature_evidence(demonstrations, tree, rule)
-        figures = features_html(evidence, tree.source.features, label_colour(rule.action))
+        figures = features_html(evidence, tree.source.features, label_colour(rule.label))
         parts.append(heading("What it asks, feature by feature") + figures)
         features = tree.source.features
         planes = combination_plots(demonstrations, rule, tree.dimension, features)

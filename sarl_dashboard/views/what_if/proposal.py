@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import streamlit as st
 
+from sarl_core.mining.action_words import label_text
 from sarl_core.mining.labels import LabelledDimension
-from sarl_core.mining.language import label_text
 from sarl_core.shielding.sampling import Span
 from sarl_dashboard.views.what_if.slider import span_slider
 

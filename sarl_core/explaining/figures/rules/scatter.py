@@ -16,7 +16,8 @@ from sarl_core.explaining.figures.rules.measures import RuleMeasure, measures_of
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.ticks import round_ticks, share_ticks, tick_text
-from sarl_core.mining.language import action_text, sentence
+from sarl_core.mining.action_words import action_text, says_text
+from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 
@@ -231,9 +232,7 @@ def dot_text(dot: RuleDot, rule_set: RuleSet) -> str:
     rule, features = dot.rules[0], rule_set.source.features
     lines = []
     if len(dot.rules) > 1:
-        says = Counter(
-            action_text(one.action, rule_set.actions[one.dimension]) for one in dot.rules
-        )
+        says = Counter(says_text(one, rule_set.actions[one.dimension]) for one in dot.rules)
         lines.append(f"<b>{len(dot.rules):,} rules with these two numbers</b>")
         lines += _wrapped(", ".join(f"{count:,} {name}" for name, count in says.most_common()))
         lines.append("The one with the most states:")

@@ -1,19 +1,14 @@
-"""The rule file: JSON, thresholds at full precision, and nothing in it that is not understood."""
+"""Reading a rule file: nothing in it that is not understood."""
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import cache
 from itertools import pairwise
-from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
-import msgspec
 import numpy as np
 from msgspec import Meta, Struct
 from msgspec.structs import asdict, astuple
@@ -38,30 +33,9 @@ from sarl_core.errors import InputError, quoted
 from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
 from sarl_core.mining.rule_contents import RuleContents
-from sarl_core.mining.rules import Condition, Operator, Rule, Thresholds
+from sarl_core.mining.rule_files.writing import FORMAT, VERSIONS
+from sarl_core.mining.rules import Condition, Kind, Operator, Rule, Thresholds
 from sarl_core.mining.tree import Learner, Source
-
-FORMAT = "sarl-rules"
-VERSIONS = (1, 2)
-"""Version 2 tells in how many episodes held-out pairs lie, what features say of words, how they are
-derived from others, which actions labels stand for that do not count, and that a histogram learner
-grew the trees. A file without all that is written as version 1, which is what it was before there
-was another."""
-_MOST_CONDITIONS = 500_000  # a line for each of their values: a file of 50 MB
-
-
-_JSON = json.JSONEncoder(allow_nan=False, ensure_ascii=False)
-
-
-def write_rules(rule_set: RuleContents, path: Path) -> None:
-    """Write a rule file without ever having it whole.
-
-    Args:
-        rule_set: To write.
-        path: The file.
-    """
-    with path.open("w", encoding="utf-8", newline="\n") as file:
-        file.writelines(file_parts(rule_set))
 
 
 def read_rules(text: str | bytes, name: str) -> RuleContents:
@@ -101,205 +75,6 @@ def read_rules(text: str | bytes, name: str) -> RuleContents:
     except MisfitError as error:
         raise InputError(f"{name}: {error}; mend it or mine the rules again") from error
     return contents
-
-
-def file_parts(rule_set: RuleContents) -> Iterator[str]:
-    """The text of a rule file, so that nobody need have it whole.
-
-    Args:
-        rule_set: To write.
-
-    Yields:
-        Parts of JSON of which each has one rule at most.
-    """
-    indented = sum(len(rule.conditions) for rule in rule_set.rules) <= _MOST_CONDITIONS
-    opening = "{"
-    for key, value in _document(rule_set).items():
-        yield f"{opening}\n {json.dumps(key)}: "
-        opening = ","
-        if not isinstance(value, Iterator):
-            yield _value(value, 1, indented)
-            continue
-        start = "["
-        lines: Iterator[str] = (_value(entry, 2, indented) for entry in value)
-        if key == "rules" and not indented:
-            lines = _rule_lines(rule_set.rules)
-        for line in lines:
-            yield f"{start}\n  {line}"
-            start = ","
-        yield "[]" if start == "[" else "\n ]"
-    yield "\n}\n"
-
-
-def _value(value: Any, depth: int, indented: bool) -> str:
-    """A value so deep in the document: with a line for each of what is in it, or on one line."""
-    text = _JSON.encode(value)
-    if indented:
-        # As `json` would, which has no fast way to indent; half a pair has no other encoding.
-        encoded = text.encode(errors="surrogatepass")
-        text = msgspec.json.format(encoded, indent=1).decode(errors="surrogatepass")
-    return text.replace("\n", "\n" + " " * depth)  # texts hold none: there it is an escape
-
-
-def _rule_lines(rules: Sequence[Rule]) -> Iterator[str]:
-    """The same of many rules: what they share is written once, and boxes in the fast way."""
-    query = cache(_query_text)
-    for rule in rules:
-        queries = ", ".join(map(query, rule.conditions))
-        box = "" if rule.box is None else _box_text(rule.box)
-        # Within a text of JSON no quotation mark stands by itself: these are the keys.
-        line = _JSON.encode(rule_document(rule, [], {} if box else None))
-        line = line.replace('"conditions": []', f'"conditions": [{queries}]', 1)
-        yield line.replace('"box": {}', f'"box": {box}', 1) if box else line
-
-
-def _query_text(condition: Condition) -> str:
-    """A query on one line, as `json` writes it."""
-    feature, op, threshold = condition
-    if not math.isfinite(threshold):
-        return _JSON.encode(_condition(condition))  # which refuses it
-    return f'{{"feature": {feature}, "op": "{op}", "threshold": {_number(threshold)!r}}}'
-
-
-def _box_text(box: DataBox) -> str:
-    """A box on one line, as `json` writes it; it takes most of the room in a file of many rules."""
-    text = msgspec.json.encode(tuple(box)).decode()
-    if "e" in text or "null" in text or "0.0000" in text:  # which `json` writes otherwise
-        return _JSON.encode(_box(box))
-    least, low, high, most = text[2:-2].replace(",", ", ").split("], [")
-    return f'{{"least": [{least}], "low": [{low}], "high": [{high}], "most": [{most}]}}'
-
-
-def _document(rule_set: RuleContents) -> dict[str, Any]:
-    """What stands under each key: a value of JSON, or what makes those of a list one by one."""
-    source, thresholds = rule_set.source, rule_set.thresholds
-    queries: set[Condition] = set().union(*(rule.conditions for rule in rule_set.rules))
-    by_feature: list[set[float]] = [set() for _ in source.features]
-    for feature, _, threshold in queries:
-        by_feature[feature].add(threshold)
-    return {
-        "format": FORMAT,
-        "version": 2 if _needs_version_2(rule_set) else 1,
-        "env_id": source.env_id,
-        "features": map(_feature, source.features, by_feature),
-        "actions": map(_action, rule_set.actions),
-        "thresholds": {
-            "support": _number(thresholds.support),
-            "confidence": _number(thresholds.confidence),
-            "lift": _number(thresholds.lift),
-            "max_depth": thresholds.max_depth,
-        },
-        "divider": rule_set.divider,
-        # Where it is the paper's cut, the file is what it was before there was another.
-        **({"cut": rule_set.cut} if rule_set.cut != "thresholds" else {}),
-        **({"learner": rule_set.learner} if rule_set.learner != "exact" else {}),
-        "demonstrations": {
-            "digest": source.digest,
-            "steps": source.steps,
-            "episodes": source.episodes,
-        },
-        "rules": map(rule_document, rule_set.rules),
-    }
-
-
-def _needs_version_2(rule_set: RuleContents) -> bool:
-    """Whether there is something that version 1 did not know."""
-    return (
-        any(rule.held_out is not None for rule in rule_set.rules)
-        or any(one.indicator or one.derived for one in rule_set.source.features)
-        or any(action.codes for action in rule_set.actions)
-        or rule_set.learner != "exact"
-    )
-
-
-def _number(value: float) -> float:
-    """Equal numbers are written alike, as 1 and 1.0, or zero with a sign and without."""
-    return float(value) + 0.0
-
-
-def _feature(feature: Feature, thresholds: set[float]) -> dict[str, Any]:
-    entry: dict[str, Any] = {"name": feature.name, "unit": feature.unit}
-    if isinstance(feature.derived, Combination):
-        entry["derived"] = {"terms": [list(term) for term in feature.derived.terms]}
-    elif feature.derived is not None:
-        entry["derived"] = {"formula": feature.derived.text}
-    if feature.indicator is not None:
-        entry["indicator"] = {
-            key: text for key, text in dataclasses.asdict(feature.indicator).items() if text
-        }
-    if feature.splits is not None:
-        splits = feature.splits.only(thresholds)
-        columns = (splits.thresholds, splits.below, splits.above)
-        entry["splits"] = [
-            [value if math.isfinite(value) else None for value in row]
-            for row in zip(*(column.tolist() for column in columns), strict=True)
-        ]
-        if splits.binary:
-            entry["binary"] = True
-    return entry
-
-
-def _action(action: LabelledDimension) -> dict[str, Any]:
-    if action.is_interval:
-        return {
-            "name": action.name,
-            "kind": "interval",
-            "edges": list(action.edges),
-            "bounds_from": action.bounds_from,
-        }
-    return {
-        "name": action.name,
-        "kind": "discrete",
-        "labels": list(action.label_names),
-        **({"codes": list(action.codes)} if action.codes else {"first": action.first}),
-    }
-
-
-def _condition(condition: Condition) -> dict[str, Any]:
-    feature, op, threshold = condition
-    return {"feature": feature, "op": op, "threshold": _number(threshold)}
-
-
-def _box(box: DataBox) -> dict[str, Any]:
-    return {name: list(values) for name, values in box.by_name().items()}
-
-
-def rule_document(
-    rule: Rule,
-    conditions: list[dict[str, Any]] | None = None,
-    box: dict[str, Any] | None = None,
-) -> dict[str, Any]:
-    """A rule as the file has it.
-
-    Args:
-        rule: To write.
-        conditions: Its conditions as the file has them, where they are at hand.
-        box: Its box as the file has it, where that is at hand.
-    """
-    if conditions is None:
-        conditions = list(map(_condition, rule.conditions))
-    entry: dict[str, Any] = {
-        "id": rule.id,
-        "dimension": rule.dimension,
-        "conditions": conditions,
-        "action": rule.action,
-        "support": _number(rule.support),
-        "confidence": _number(rule.confidence),
-        "lift": _number(rule.lift),
-        "samples": rule.samples,
-        "length": rule.length,
-        "enabled": rule.enabled,
-        "origin": rule.origin,
-    }
-    if rule.demonstrated_value is not None:
-        entry["demonstrated_value"] = _number(rule.demonstrated_value)
-    if rule.pinned:
-        entry["pinned"] = True
-    if rule.box is not None:
-        entry["box"] = _box(rule.box) if box is None else box
-    if rule.held_out is not None:
-        entry["held_out"] = rule.held_out._asdict()
-    return entry
 
 
 # What a file may say. Nothing else: whatever stands there beside is refused by its name.
@@ -418,6 +193,7 @@ class _Thresholds(DocumentPart):
     confidence: Share
     lift: NotNegative = 0.0
     max_depth: Count | None = None
+    never: Share | None = None
 
 
 class _Demonstrations(DocumentPart):
@@ -489,11 +265,14 @@ class _Rule(DocumentPart, Generic[_Held]):
     id: str
     dimension: int
     conditions: list[_Condition]
-    action: int
     support: Share
     confidence: Share
     lift: NotNegative
     samples: Count
+    action: int | None = None
+    kind: Kind = "do"
+    forbids: tuple[int, ...] = ()
+    instead: tuple[int, ...] = ()
     length: int | None = None
     enabled: bool = True
     origin: Literal["mined", "manual"] = "mined"
@@ -509,19 +288,42 @@ class _Rule(DocumentPart, Generic[_Held]):
                 raise MisfitError(what, f"conditions {number}")
         if not 0 <= self.dimension < len(actions):
             raise MisfitError(f"there is no action dimension {quoted(self.dimension)}")
-        n_labels = actions[self.dimension].n_labels
-        if not 0 <= self.action < n_labels:
-            raise MisfitError(f"the action {quoted(self.action)} is none of the {n_labels} labels")
+        action = self._action(actions[self.dimension].n_labels)
         if self.length not in (None, len(self.conditions)):
             raise MisfitError(f"'length' does not match its {len(self.conditions)} conditions")
         if self.samples > steps:
             raise MisfitError(f"'samples' is {self.samples}, not a whole number from 0 to {steps}")
-        entries = asdict(self)
-        del entries["length"]
+        entries = asdict(self) | {"action": action}
+        del entries["length"], entries["kind"]
         entries["conditions"] = tuple(Condition(*astuple(one)) for one in self.conditions)
         entries["box"] = self.box and self.box.read(n_features)
         entries["held_out"] = self.held_out and self.held_out.read()
         return Rule(**entries)
+
+    def _action(self, n_labels: int) -> int:
+        """What a rule demands, or what comes first where it forbids.
+
+        Raises:
+            MisfitError: If it is neither a rule that demands nor one that forbids.
+        """
+        if self.kind == "do":
+            if self.action is None:
+                raise MisfitError("'action' is missing")
+            if self.forbids or self.instead:
+                raise MisfitError("a rule that says what to do has no 'forbids' and no 'instead'")
+            if not 0 <= self.action < n_labels:
+                what = f"the action {quoted(self.action)} is none of the {n_labels} labels"
+                raise MisfitError(what)
+            return self.action
+        if self.action is not None:
+            raise MisfitError("a never-rule has 'forbids' and no 'action'")
+        if not self.forbids or list(self.forbids) != sorted(set(self.forbids)):
+            raise MisfitError("'forbids' must be one label or more, ascending, each once")
+        if sorted((*self.forbids, *self.instead)) != list(range(n_labels)):
+            raise MisfitError(
+                f"'forbids' and 'instead' together must be the {n_labels} labels, each once"
+            )
+        return (*self.instead, self.forbids[0])[0]
 
 
 RuleDocument = _Rule[_HeldOut]
@@ -578,6 +380,10 @@ class _Document(DocumentPart, Generic[_Held]):
     learner: Learner = "exact"
 
     def read(self) -> RuleContents:
+        if self.version == 1 and (
+            self.thresholds.never is not None or any(one.kind != "do" for one in self.rules)
+        ):
+            raise MisfitError("version 1 of the format knows no never-rules; they came with 2")
         features = _features(self.features, self.version)
         actions = each(self.actions, "actions", lambda action: action.read())
         if not features or not actions:

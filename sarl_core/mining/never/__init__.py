@@ -1,0 +1,1 @@
+"""Rules that forbid: what the expert does not do where it could."""

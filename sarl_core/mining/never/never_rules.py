@@ -1,0 +1,212 @@
+"""Never-rules: where the expert was seen often enough, what it does not do there is forbidden.
+
+A node forbids a label when it has the support, and the upper 95 % bound of the label's share among
+its pairs is at most epsilon. On every path the first such node is the rule for the label, as
+Algorithm 1 cuts a path at its first node that qualifies. Rules for different labels may overlap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from numbers import Real
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import InputError, require
+from sarl_core.mining.algorithm_1 import conditions_to
+from sarl_core.mining.envelope import with_boxes
+from sarl_core.mining.growing.growth import grow_policy_trees
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rules import Rule, Thresholds
+from sarl_core.mining.tree import PolicyTree, several_trees, source_of
+
+_CERTAINTY = 0.95  # one-sided: that the share is not larger
+
+
+def upper_bound(count: NDArray[np.int64], of: NDArray[np.int64]) -> NDArray[np.float64]:
+    """How large a share may be that was seen in a sample (Clopper and Pearson, 95 %, one-sided).
+
+    Args:
+        count: How many of the sample had it, any shape.
+        of: Size of the sample, of a shape that fits.
+
+    Returns:
+        0 to 1; 1 where all had it, or nothing was sampled.
+    """
+    from scipy.special import betaincinv  # takes its time; most programs need none
+
+    count, of = np.broadcast_arrays(count, of)
+    bound = np.ones(count.shape)
+    some = count < of
+    bound[some] = betaincinv(count[some] + 1.0, of[some] - count[some], _CERTAINTY)
+    return bound
+
+
+def forbidding_nodes(
+    tree: PolicyTree, *, epsilon: float, supp_min: float = 0.0, max_depth: int | None = None
+) -> NDArray[np.bool_]:
+    """The nodes that forbid labels.
+
+    Args:
+        tree: With n nodes.
+        epsilon: Most that the upper bound of a forbidden label's share may be.
+        supp_min: Minimum support.
+        max_depth: Nodes below this depth are ignored.
+
+    Returns:
+        Whether a node is the first on its path that qualifies for a label, (n, labels).
+    """
+    qualifies = upper_bound(tree.counts, tree.samples[:, None]) <= epsilon
+    qualifies &= (tree.support >= supp_min)[:, None]
+    if max_depth is not None:
+        qualifies &= (tree.depth <= max_depth)[:, None]
+    above = np.zeros_like(qualifies)
+    # Parents stand before their children, whichever learner numbered them by depth.
+    for node in np.argsort(tree.depth, kind="stable")[1:].tolist():
+        parent = tree.parent[node]
+        above[node] = above[parent] | qualifies[parent]
+    first: NDArray[np.bool_] = qualifies & ~above
+    return first
+
+
+def mine_never_rules(
+    demonstrations_or_trees: Demonstrations | PolicyTree | Sequence[PolicyTree],
+    *,
+    epsilon: float,
+    supp_min: float = 0.0,
+    max_depth: int | None = None,
+    divider: int = 2,
+) -> RuleSet:
+    """Mine rules that forbid what the expert does at most rarely.
+
+    Args:
+        demonstrations_or_trees: N pairs, or the tree or trees grown from them.
+        epsilon: A label is forbidden where the upper 95 % bound of its share is at most this; above
+            0, below 1.
+        supp_min: Minimum support of a rule, 0 to 1.
+        max_depth: Longest rule, in queries.
+        divider: Number of intervals of continuous dimensions, where demonstrations are given.
+
+    Returns:
+        The rules, by action dimension, label and node. With two labels a rule that forbids one
+        demands the other. With their data boxes where demonstrations were given.
+
+    Raises:
+        InputError: If a threshold is out of range, or there is nothing to mine.
+    """
+    thresholds = never_thresholds(epsilon, supp_min, max_depth)
+    if isinstance(demonstrations_or_trees, Demonstrations):
+        trees = grow_policy_trees(demonstrations_or_trees, divider=divider)
+    else:
+        trees = several_trees(
+            demonstrations_or_trees,
+            "what rules are mined from must be Demonstrations, or trees grown from them,",
+            "load some: load_demonstrations(path)",
+        )
+    if not trees:
+        raise InputError("there is no tree to mine; give demonstrations, or grow the trees first")
+    mined = RuleSet(
+        rules=tuple(
+            rule
+            for tree in trees
+            for rule in never_rules_of(
+                tree, epsilon=epsilon, supp_min=supp_min, max_depth=max_depth
+            )
+        ),
+        actions=tuple(tree.dimension for tree in trees),
+        source=source_of(trees),
+        thresholds=thresholds,
+        divider=trees[0].divider,
+        learner=trees[0].learner,
+    )
+    if isinstance(demonstrations_or_trees, Demonstrations):
+        return with_boxes(mined, demonstrations_or_trees)
+    return mined
+
+
+def with_never_rules(rule_set: RuleSet, trees: Sequence[PolicyTree], epsilon: float) -> RuleSet:
+    """Rules that demand an action, and behind them what is forbidden where none of them applies.
+
+    Args:
+        rule_set: Mined from the trees, at some support and maximum depth.
+        trees: One an action dimension.
+        epsilon: As of `mine_never_rules`.
+
+    Returns:
+        Both; a shield asks the rules that demand first.
+
+    Raises:
+        InputError: If epsilon is out of range.
+    """
+    at = rule_set.thresholds
+    forbidding = mine_never_rules(
+        trees, epsilon=epsilon, supp_min=at.support, max_depth=at.max_depth
+    )
+    return replace(
+        rule_set,
+        rules=(*rule_set.rules, *forbidding.rules),
+        thresholds=replace(at, never=epsilon),
+    )
+
+
+def never_thresholds(
+    epsilon: float, supp_min: float = 0.0, max_depth: int | None = None
+) -> Thresholds:
+    """The thresholds of never-rules alone.
+
+    Args:
+        epsilon: Most that a forbidden label's share may be, by its upper bound.
+        supp_min: Minimum support.
+        max_depth: Longest rule.
+
+    Raises:
+        InputError: If one is out of range.
+    """
+    must = "epsilon, the most that a forbidden action's share may be, must be a number"
+    require(epsilon, Real, must, "give a share above 0 and below 1, as 0.1")
+    return Thresholds(supp_min, 1.0, 0.0, max_depth, never=float(epsilon))
+
+
+def never_rules_of(
+    tree: PolicyTree, *, epsilon: float, supp_min: float, max_depth: int | None = None
+) -> list[Rule]:
+    """The never-rules of one tree.
+
+    Args:
+        tree: Of one action dimension.
+        epsilon: As of `mine_never_rules`.
+        supp_min: Minimum support.
+        max_depth: Longest rule.
+
+    Returns:
+        By label and node.
+    """
+    labels, nodes = np.nonzero(
+        forbidding_nodes(tree, epsilon=epsilon, supp_min=supp_min, max_depth=max_depth).T
+    )
+    rules = []
+    everywhere = 1.0 - tree.counts[0] / tree.samples[0]
+    for label, node, conditions in zip(
+        labels.tolist(), nodes.tolist(), conditions_to(tree, nodes), strict=True
+    ):
+        samples, counts = int(tree.samples[node]), tree.counts[node]
+        obeyed = 1.0 - int(counts[label]) / samples
+        order = [int(one) for one in np.argsort(-counts, kind="stable") if one != label]
+        rules.append(
+            Rule(
+                id=f"{tree.index}n{label}.{tree.number[node]}",
+                dimension=tree.index,
+                conditions=conditions,
+                action=order[0] if order else label,
+                support=float(tree.support[node]),
+                confidence=obeyed,
+                lift=obeyed / float(everywhere[label]) if everywhere[label] else 1.0,
+                samples=samples,
+                forbids=(label,),
+                instead=tuple(order),
+            )
+        )
+    return rules

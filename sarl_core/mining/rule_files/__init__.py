@@ -1,0 +1,1 @@
+"""The rule file: JSON, thresholds at full precision."""

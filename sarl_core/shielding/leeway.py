@@ -1,0 +1,62 @@
+"""What rules leave an agent to choose from, and whether the expert would have kept to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.shielding.shield import Shield
+
+
+@dataclass(frozen=True)
+class Leeway:
+    """What rules say of demonstrated pairs, each mean over the action dimensions.
+
+    Attributes:
+        coverage: Share of the pairs to which a rule applies.
+        fidelity: Share of these that are as the rules say; NaN where none applies.
+        freedom: Mean over the pairs of log(labels still allowed) / log(labels).
+    """
+
+    coverage: float
+    fidelity: float
+    freedom: float
+
+
+def leeway_of(rule_set: RuleSet, demonstrations: Demonstrations) -> Leeway:
+    """Hold rules against what the expert did.
+
+    Rules that forbid overlap, so that what they cover together is seen in the pairs alone.
+
+    Args:
+        rule_set: In the order of the same features and action dimensions.
+        demonstrations: N pairs.
+
+    Returns:
+        What they say of them.
+
+    Raises:
+        InputError: If the pairs are for other rules.
+    """
+    shield = Shield(rule_set, on_invalid="pass")
+    states = demonstrations.raw_observations
+    decision = shield.decide_batch(states, demonstrations.actions)
+    in_force = decision.rules
+    covered = in_force >= 0
+    labels = [
+        dimension.labels_of(demonstrations.action_columns[:, index])
+        for index, dimension in enumerate(rule_set.actions)
+    ]
+    obeyed = sum(
+        int(
+            rule.obeyed_by(labels[rule.dimension][decision.rules[:, rule.dimension] == place]).sum()
+        )
+        for place, rule in enumerate(rule_set.rules)
+    )
+    count = int(covered.sum())
+    return Leeway(
+        coverage=float(covered.mean()),
+        fidelity=obeyed / count if count else float("nan"),
+        freedom=float(shield.freedom(states, decision.rules).mean()),
+    )

@@ -1,0 +1,60 @@
+"""What a shield made of actions: the heart of the flight recorder."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Decision(NamedTuple):
+    """What the shield made of one action; the heart of the flight recorder.
+
+    Attributes:
+        executed: The action to execute, in the environment's dtype; where it breaks no rule and
+            has that dtype (and, where the environment is known, that shape) already, the proposed
+            object itself. Where the action is `invalid` and passes, that object, too.
+        proposed: The agent's action.
+        rules: For each action dimension the index of the rule in force, in the rule set's
+            order, or None.
+        intervened: Whether the shield changed the action.
+        margin: Distance of the state to the nearest threshold on the paths walked, in the
+            feature's own unit; inf where there is no threshold, NaN where no path was walked.
+        outside: Whether the state lies outside the data of a rule that the proposed action
+            breaks: of one that changed it, or, where rules abstain, would have.
+        invalid: Why no rule was asked, where the observation is no state or the action none of
+            the space; else None.
+    """
+
+    executed: Any
+    proposed: Any
+    rules: tuple[int | None, ...]
+    intervened: bool
+    margin: float
+    outside: bool = False
+    invalid: str | None = None
+
+
+class BatchDecision(NamedTuple):
+    """What the shield made of B actions.
+
+    Attributes:
+        executed: In the environment's dtype, and in its shape where it is known, else in that
+            of the proposed actions. Where invalid actions pass that this dtype cannot hold,
+            B objects, each as `decide` gives it.
+        proposed: The agent's actions; B objects where they are no array of numbers.
+        rules: Index of the rule in force or -1, (B, m) int64.
+        intervened: Shape (B,).
+        margin: Shape (B,).
+        outside: Shape (B,).
+        invalid: Why no rule was asked, or None, (B,) objects.
+    """
+
+    executed: NDArray[Any]
+    proposed: NDArray[Any]
+    rules: NDArray[np.int64]
+    intervened: NDArray[np.bool_]
+    margin: NDArray[np.float64]
+    outside: NDArray[np.bool_]
+    invalid: NDArray[np.object_]
