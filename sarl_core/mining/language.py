@@ -414,9 +414,11 @@ def _sentence(rule: Rule, parts: Sequence[str], action: str, *, evidence: bool) 
         text = f"If {parts[0]}, then {action}"
     else:
         text = f"If {', '.join(parts[:-1])} and {parts[-1]}, then {action}"
-    if not evidence or rule.origin != "mined":
+    if not evidence or rule.origin == "manual":
         return f"{text}."
     states = "1 state" if rule.samples == 1 else f"{rule.samples:,} states"
+    if rule.origin == "probed":
+        return f"{text}: after it the expert failed in {share_text(rule.confidence)} of {states}."
     if rule.forbids:
         return f"{text}: the expert did not in {share_text(rule.confidence)} of {states}."
     return f"{text}: so did the expert in {share_text(rule.confidence)} of {states}."
@@ -528,6 +530,9 @@ def limits_text(rule_set: RuleContents) -> str:
         limits.append(f"confidence at least {limit_text(thresholds.confidence)}")
     if thresholds.never is not None:
         limits.append(f"forbidden what the expert does in at most {limit_text(thresholds.never)}")
+    if any(rule.origin == "probed" for rule in rule_set.rules):
+        risk = limit_text(thresholds.confidence)
+        limits = [f"forbidden what the expert fails after in more than {risk}"]
     if rule_set.cut == "leaves":
         limits = ["every leaf of the tree"]
     if thresholds.lift:

@@ -16,6 +16,7 @@ from sarl_core.mining.evidence import DataBox, HeldOut
 
 Operator = Literal["<=", ">"]
 Kind = Literal["do", "never"]
+Origin = Literal["mined", "manual", "probed"]
 T = TypeVar("T")
 
 FIRST_REGROWN, LAST_REGROWN = 10**15, 9 * 10**15 - 1
@@ -62,11 +63,11 @@ class Rule:
         action: The label; of a never-rule that which comes first in the place of what it forbids.
         support: Share of all pairs to which it applies.
         confidence: Share of those that carry its label; of a never-rule, that carry none which it
-            forbids.
+            forbids; of a probed one, in which the expert failed after what it forbids.
         lift: Confidence over the same share of all pairs.
         samples: Number of pairs to which it applies.
         enabled: Whether a shield uses it.
-        origin: Whether it was mined or written by a person.
+        origin: Whether it was mined, written by a person, or follows from probes.
         demonstrated_value: Of a continuous dimension, the median action shown where it
             applies; None otherwise.
         pinned: Whether a person has given it its place: it comes before those that were only
@@ -87,7 +88,7 @@ class Rule:
     lift: float
     samples: int
     enabled: bool = True
-    origin: Literal["mined", "manual"] = "mined"
+    origin: Origin = "mined"
     demonstrated_value: float | None = None
     pinned: bool = False
     box: DataBox | None = None

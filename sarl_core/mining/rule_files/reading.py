@@ -34,7 +34,7 @@ from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
 from sarl_core.mining.rule_contents import RuleContents
 from sarl_core.mining.rule_files.writing import FORMAT, VERSIONS
-from sarl_core.mining.rules import Condition, Kind, Operator, Rule, Thresholds
+from sarl_core.mining.rules import Condition, Kind, Operator, Origin, Rule, Thresholds
 from sarl_core.mining.tree import Learner, Source
 
 
@@ -275,7 +275,7 @@ class _Rule(DocumentPart, Generic[_Held]):
     instead: tuple[int, ...] = ()
     length: int | None = None
     enabled: bool = True
-    origin: Literal["mined", "manual"] = "mined"
+    origin: Origin = "mined"
     demonstrated_value: _Action | None = None
     pinned: bool = False
     box: _Box | None = None
@@ -309,8 +309,9 @@ class _Rule(DocumentPart, Generic[_Held]):
         if self.kind == "do":
             if self.action is None:
                 raise MisfitError("'action' is missing")
-            if self.forbids or self.instead:
-                raise MisfitError("a rule that says what to do has no 'forbids' and no 'instead'")
+            if self.forbids or self.instead or self.origin == "probed":
+                what = "a rule that says what to do has no 'forbids', no 'instead' and no probes"
+                raise MisfitError(what)
             if not 0 <= self.action < n_labels:
                 what = f"the action {quoted(self.action)} is none of the {n_labels} labels"
                 raise MisfitError(what)
