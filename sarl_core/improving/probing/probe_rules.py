@@ -99,8 +99,8 @@ def _rules_of(tree: PolicyTree, counts: NDArray[np.int64], risk: float) -> list[
     for label, node, conditions in zip(
         labels.tolist(), nodes.tolist(), conditions_to(tree, nodes), strict=True
     ):
-        shown = tree.counts[node]
-        order = tuple(int(one) for one in np.argsort(-shown, kind="stable") if one != label)
+        counts_there = tree.counts[node]
+        order = tuple(int(one) for one in np.argsort(-counts_there, kind="stable") if one != label)
         confidence, everywhere = float(share[node, label]), float(share[0, label])
         rules.append(
             Rule(
