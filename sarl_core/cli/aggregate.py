@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,7 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import pairs_of, read_agent, read_demonstrations, workers_at
+from sarl_core.cli.inputs import (
+    pairs_of,
+    read_agent,
+    read_demonstrations,
+    typed_again,
+    workers_at,
+)
 from sarl_core.cli.options import (
     AgentName,
     ChoiceName,
@@ -31,7 +36,6 @@ from sarl_core.cli.options import (
     with_derived,
     with_played_environment,
 )
-from sarl_core.cli.stand_ins import said
 from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
@@ -204,7 +208,7 @@ def aggregate(
             executor=executor,
             progress=advance,
         )
-    written, card = save_aggregation(aggregation, out, command=_command(context))
+    written, card = save_aggregation(aggregation, out, command=typed_again(context))
     if not aggregation.is_finished:
         left = _what_is_left(aggregation, written, out)
         if aggregation.fault:
@@ -392,20 +396,3 @@ def _keep_gaps(gaps: Gaps, out: Path, planned: int) -> str:
         f"stopped after {gaps.episodes} of {planned} episodes; the {len(gaps):,} "
         f"states without a rule that they met are in {written}{beside}"
     )
-
-
-def _command(context: typer.Context) -> str:
-    """The command as it can be typed again, defaults left out."""
-    words = ["python -m sarl_core aggregate"]
-    for parameter in context.command.params:
-        value = context.params.get(parameter.name or "")
-        if (
-            parameter.name in ("as_json", "jobs", "cluster")
-            or value is None
-            or value == parameter.default
-        ):
-            continue
-        option = [] if parameter.param_type_name == "argument" else [parameter.opts[0]]
-        for one in value if isinstance(value, (list, tuple)) else [value]:
-            words += [*option, shlex.quote(said(str(one)))]
-    return " ".join(words)

@@ -23,6 +23,7 @@ from sarl_core.cli.export import export
 from sarl_core.cli.learning import learn, train_expert
 from sarl_core.cli.library import CommandGroup, library
 from sarl_core.cli.options import with_bare_combine
+from sarl_core.cli.probe import probe
 from sarl_core.cli.report import report
 from sarl_core.cli.reproduce import reproduce
 from sarl_core.cli.rules import landscape, mine
@@ -50,6 +51,7 @@ for command in (
     report,
     export,
     aggregate,
+    probe,
     learn,
     train_expert,
     reproduce,

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+import typer
+
 from sarl_core.cli import terminal
 from sarl_core.cli.options import EVERY_PAIR, MINED, Derived
-from sarl_core.cli.stand_ins import called
+from sarl_core.cli.stand_ins import called, said
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError
 
@@ -215,3 +218,27 @@ def read_shield(
             "mine the rules again, or leave the option out"
         )
     return shield
+
+
+def typed_again(context: typer.Context) -> str:
+    """The command as it can be typed again.
+
+    Args:
+        context: Of a command that was called.
+
+    Returns:
+        Without defaults, and without what changes the speed or the answer's form alone.
+    """
+    words = [f"python -m sarl_core {context.info_name}"]
+    for parameter in context.command.params:
+        value = context.params.get(parameter.name or "")
+        if (
+            parameter.name in ("as_json", "jobs", "cluster")
+            or value is None
+            or value == parameter.default
+        ):
+            continue
+        option = [] if parameter.param_type_name == "argument" else [parameter.opts[0]]
+        for one in value if isinstance(value, (list, tuple)) else [value]:
+            words += [*option, shlex.quote(said(str(one)))]
+    return " ".join(words)

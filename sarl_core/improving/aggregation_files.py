@@ -14,6 +14,7 @@ from sarl_core.errors import WorkError
 from sarl_core.files import whole_file
 from sarl_core.improving.aggregation import Aggregation, AggregationRound
 from sarl_core.mining.rule_files.writing import write_rules
+from sarl_core.rollouts.episodes import Episodes
 from sarl_core.rollouts.statistics import summarise
 
 
@@ -137,7 +138,9 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         "reported_on": f"{plan.report} episodes used for nothing else"
         if aggregation.is_finished
         else None,
-        "reported": _reported(aggregation),
+        "reported": None
+        if aggregation.reported is None
+        else reported_entries(aggregation.reported),
         "seeds": aggregation.seeds._asdict(),
         "demonstrations": {
             "digest": rules.source.digest,
@@ -179,10 +182,12 @@ def _round(one: AggregationRound) -> dict[str, Any]:
     }
 
 
-def _reported(aggregation: Aggregation) -> dict[str, Any] | None:
-    episodes = aggregation.reported
-    if episodes is None:
-        return None
+def reported_entries(episodes: Episodes) -> dict[str, Any]:
+    """What a card says of episodes that nothing was chosen by.
+
+    Args:
+        episodes: Of a report.
+    """
     spread = summarise(episodes.returns)
     return {
         "episodes": len(episodes),
