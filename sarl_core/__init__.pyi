@@ -35,5 +35,8 @@ from .shielding.shield import Decision as Decision
 from .shielding.shield import Shield as Shield
 from .shielding.vec_env import ShieldedVecEnv as ShieldedVecEnv
 from .shielding.wrappers import ShieldedEnv as ShieldedEnv
+from .studies.certificate import Certificate as Certificate
+from .studies.certificate import certify as certify
+from .studies.certificate_files import load_certificate as load_certificate
 
 __version__: str

@@ -8,8 +8,9 @@ keeps ``act`` a pure function.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
@@ -128,6 +129,29 @@ class MlpPolicy:
         widths = [self.n_features, *(len(bias) for bias in self.biases)]
         layers = "x".join(map(str, widths))
         return f"MlpPolicy({self.env_id!r}, layers={layers}, head={self.head!r})"
+
+    @property
+    def digest(self) -> str:
+        """Fingerprint (blake2b, 32 hex digits) of all that its actions depend on."""
+        digest = hashlib.blake2b(digest_size=16)
+
+        def add(value: object) -> None:
+            if isinstance(value, np.ndarray):
+                digest.update(f"{value.dtype}{value.shape}".encode())
+                digest.update(np.ascontiguousarray(value).data)
+            elif isinstance(value, tuple):
+                digest.update(f"{len(value)} of".encode())
+                for one in value:
+                    add(one)
+            else:
+                digest.update(f"{value!r};".encode())
+
+        for holder in (self, self.normalisation):
+            for part in fields(holder) if holder is not None else ():
+                if part.name != "normalisation":
+                    add(part.name)
+                    add(getattr(holder, part.name))
+        return digest.hexdigest()
 
     def _check_layers(self) -> None:
         width = self.n_features

@@ -12,13 +12,11 @@ import typer
 
 from sarl_core import __version__
 from sarl_core.cli import terminal
-from sarl_core.cli.ablate import ablate
 from sarl_core.cli.aggregate import aggregate
 from sarl_core.cli.audit import audit
 from sarl_core.cli.dashboard import app as dashboard
 from sarl_core.cli.demonstrations import check, record
 from sarl_core.cli.diff import diff
-from sarl_core.cli.episodes import evaluate, render
 from sarl_core.cli.export import export
 from sarl_core.cli.learning import learn, train_expert
 from sarl_core.cli.library import CommandGroup, library
@@ -27,6 +25,9 @@ from sarl_core.cli.probe import probe
 from sarl_core.cli.report import report
 from sarl_core.cli.reproduce import reproduce
 from sarl_core.cli.rules import landscape, mine
+from sarl_core.cli.trials.ablate import ablate
+from sarl_core.cli.trials.certify import certify
+from sarl_core.cli.trials.episodes import evaluate, render
 
 app = typer.Typer(
     name="sarl_core",
@@ -48,6 +49,7 @@ for command in (
     evaluate,
     render,
     ablate,
+    certify,
     report,
     export,
     aggregate,

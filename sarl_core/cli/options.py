@@ -255,6 +255,15 @@ ClusterAddress = Annotated[
         "the extra cluster.",
     ),
 ]
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        "--jobs",
+        min=1,
+        show_default=False,
+        help="Processes; as many as there are processors where not given. The result is the same.",
+    ),
+]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document, nothing else.")]
 
 

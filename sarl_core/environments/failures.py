@@ -131,6 +131,26 @@ def no_failures_text(environment: EnvironmentOrId) -> str:
     return "nothing says which ends of this environment's episodes are failures"
 
 
+def failure_text(environment: EnvironmentOrId) -> str:
+    """What a failure is in an environment.
+
+    Args:
+        environment: Its id, or with what its caller calls a failure.
+
+    Returns:
+        As "an end with a last reward of -100"; "" where it is not known, or there is none.
+    """
+    environment = as_environment(environment)
+    if environment.failure:
+        return f"a step at which {environment.failure} is true"
+    if key := info_key(environment.id):
+        return f"a step at which the environment says {key}"
+    meaning = _end_of_failure(environment.id)
+    if isinstance(meaning, float):
+        return f"an end with a last reward of {meaning:g}"
+    return "an end that is no time limit" if meaning == _EVERY_END else ""
+
+
 def _end_of_failure(env_id: str) -> str | float | None:
     return _FAILURES.get(re.sub(r"-v\d+$", "", env_id.rsplit(":", 1)[-1]))
 

@@ -18,6 +18,7 @@ first seed            what its episodes are for
 `RELEVANCE`           steps at which learners are tested for the paper's Figure 4,
                       `SEEDS_A_LEARNER` for each
 `POOLED`              the benchmark of intervals draws its demonstrations from these
+`CERTIFIED`           certificates; nothing is chosen by them
 `ROUNDS`              rounds of `aggregate`, `SEEDS_A_ROUND` for each
 `VALIDATION`          the best of its rounds, or of its refinement, is chosen by them
 `REFINEMENT`          the search of its refinement
@@ -26,7 +27,8 @@ first seed            what its episodes are for
 
 `aggregate --seed s` begins s times `SEEDS_A_RUN` further on, whatever the purpose. Within one run
 no two purposes meet: `MOST_ROUNDS` and the numbers beside it see to that. What the paper is
-reproduced with lies below all of them, so no run, however far on, reaches it.
+reproduced with, and what certificates are made on, lies below all of them, so no run, however far
+on, reaches it.
 
 `RANGES` says how far each purpose goes. Ranges that do meet, `SHARED`, and why that does no harm:
 
@@ -62,6 +64,7 @@ RECORDED = 10_000_000
 REPRODUCED = 12_000_000
 RELEVANCE = 14_000_000
 POOLED = 19_000_000
+CERTIFIED = 19_500_000
 
 ROUNDS = 20_000_000
 VALIDATION = 30_000_000
@@ -77,6 +80,7 @@ SEEDS_A_LEARNER = 100_000
 MOST_EPISODES_A_ROUND = SEEDS_A_ROUND
 MOST_ROUNDS = (VALIDATION - ROUNDS) // SEEDS_A_ROUND
 MOST_VALIDATION = SEEDS_A_RUN // 2
+MOST_CERTIFIED = ROUNDS - CERTIFIED
 MOST_LEARNERS = (POOLED - RELEVANCE) // SEEDS_A_LEARNER
 
 RANGES: Mapping[str, range] = {
@@ -89,7 +93,8 @@ RANGES: Mapping[str, range] = {
     "RECORDED": range(RECORDED, REPRODUCED),
     "REPRODUCED": range(REPRODUCED, RELEVANCE),
     "RELEVANCE": range(RELEVANCE, POOLED),
-    "POOLED": range(POOLED, ROUNDS),
+    "POOLED": range(POOLED, CERTIFIED),
+    "CERTIFIED": range(CERTIFIED, ROUNDS),
     "ROUNDS": range(ROUNDS, VALIDATION),
     "VALIDATION": range(VALIDATION, VALIDATION + MOST_VALIDATION),
     "REFINEMENT": range(REFINEMENT, REPORT),

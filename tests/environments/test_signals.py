@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from sarl_core import Environment, rollout
+from sarl_core.environments.failures import failure_text
 from sarl_core.errors import InputError
 from sarl_core.rollouts.episodes import join
 
@@ -193,3 +194,11 @@ def test_highway_env_says_itself_what_a_crash_is() -> None:
         seed=1,
     )
     assert by_name.failed.tolist() == episodes.failed.tolist()
+
+
+def test_what_a_failure_is_can_be_said() -> None:
+    assert failure_text("LunarLander-v3") == "an end with a last reward of -100"
+    assert failure_text("CartPole-v1") == "an end that is no time limit"
+    assert failure_text("MountainCar-v0") == failure_text("FrozenLake-v1") == ""
+    named = Environment("FrozenLake-v1", failure="crashed")
+    assert failure_text(named) == "a step at which crashed is true"

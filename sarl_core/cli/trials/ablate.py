@@ -14,6 +14,7 @@ from sarl_core.cli.options import (
     AgentName,
     ClusterAddress,
     Env,
+    Jobs,
     Json,
     MaxSteps,
     Normalise,
@@ -58,16 +59,7 @@ def ablate(
     outside: OutsideName = "act",
     on_invalid: OnInvalidName = "raise",
     max_steps: MaxSteps = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs",
-            min=1,
-            show_default=False,
-            help="Processes; as many as there are processors where not given. The result is the "
-            "same.",
-        ),
-    ] = None,
+    jobs: Jobs = None,
     cluster: ClusterAddress = None,
     out: Annotated[
         Path | None, out_option("Write the table to this file.", metavar="FILE.csv")

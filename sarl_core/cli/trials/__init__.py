@@ -1,0 +1,1 @@
+"""Commands that try an agent in an environment, shielded or not."""

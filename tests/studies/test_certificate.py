@@ -1,0 +1,139 @@
+"""Certificates: what is tested, in which order it is counted, and what a file of one says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sarl_core import Environment, InputError, Shield, load_rules, make_agent, rollout
+from sarl_core.rollouts.seeds import CERTIFIED, ROUNDS
+from sarl_core.studies.certificate import Certificate, certify
+from sarl_core.studies.certificate_files import (
+    certificate_document,
+    certificate_from,
+    certificate_to_json,
+    load_certificate,
+    save_certificate,
+)
+from sarl_core.studies.sequential_test import sequential_test
+
+DATA = Path(__file__).parents[2] / "data"
+CART = "CartPole-v1"
+
+
+@pytest.fixture(scope="module")
+def shield() -> Shield:
+    return Shield(load_rules(DATA / "rules" / "cartpole_compact.json"))
+
+
+@pytest.fixture(scope="module")
+def certified(shield) -> Certificate:
+    return certify(CART, "novice", shield, at_most=0.1)
+
+
+def test_rules_that_hold_a_pole_are_certified(certified, shield):
+    verdict = certified.verdict
+    assert (verdict.certified, verdict.failures) == (True, 0)
+    assert verdict.episodes == sequential_test(0.1).certified[0]
+    assert (certified.seed, certified.last_seed) == (CERTIFIED, CERTIFIED + verdict.episodes - 1)
+    assert certified.last_seed < ROUNDS
+    subject = certified.subject
+    assert (subject.env_id, subject.agent, subject.sampled) == (CART, "novice", True)
+    assert subject.rules == len(shield.rule_set)
+    assert subject.failure == "an end that is no time limit"
+    assert subject.package.startswith("gymnasium ")
+
+
+def test_failures_are_counted_in_the_order_of_the_seeds(shield):
+    # Steps beyond 20 cm are common, so it takes a while and both kinds of episodes.
+    environment = Environment(CART, failure="abs(cart_position) > 0.3")
+    found = certify(environment, "novice", shield, at_most=0.4, certainty=0.9, seed=700)
+    played = rollout(environment, "novice", shield=shield, episodes=120, seed=700)
+    wanted = sequential_test(0.4, 0.9).decided(played.failed, played.undecided)
+    assert found.verdict == wanted
+    assert wanted.failures > 0
+    assert found.subject.failure == "a step at which abs(cart_position) > 0.3 is true"
+    there = certify(environment, "novice", shield, at_most=0.4, certainty=0.9, seed=700, jobs=2)
+    assert there.verdict == found.verdict
+    assert there.subject == found.subject
+
+
+def test_an_agent_that_fails_is_refused_and_one_cut_off_is_not_certified(shield):
+    cut = certify(CART, "novice", shield, at_most=0.1, episodes=60, max_steps=20)
+    assert (cut.verdict.certified, cut.verdict.undecided) == (None, 60)
+    assert "cut off" in " ".join(cut.notes)
+    falls = Environment(CART, failure="abs(pole_angle) >= 0")
+    refused = certify(falls, "novice", shield, at_most=0.1)
+    assert refused.verdict.certified is False
+    assert refused.verdict.failures == refused.verdict.episodes
+
+
+def test_the_digest_of_an_agent_is_that_of_its_weights(shield):
+    expert = make_agent("expert", CART)
+    one = certify(CART, expert, shield, at_most=0.3)
+    assert len(one.subject.agent_digest) == 32
+    assert certify(CART, "expert", shield, at_most=0.3).subject == one.subject
+    other = make_agent("untrained", CART, seed=1)
+    assert certify(CART, other, shield, at_most=0.3).subject.agent_digest != (
+        one.subject.agent_digest
+    )
+
+
+@pytest.mark.parametrize("env_id", ["MountainCar-v0", "FrozenLake-v1"])
+def test_where_nothing_is_a_failure_nothing_is_certified(env_id, shield):
+    with pytest.raises(InputError, match=f"nothing to certify in {env_id}"):
+        certify(env_id, "novice", shield, at_most=0.1)
+
+
+def test_a_file_says_the_same_again(certified, tmp_path):
+    path = tmp_path / "certificate.json"
+    save_certificate(certified, path)
+    assert load_certificate(path) == certified
+    document = json.loads(path.read_text())
+    assert document == certificate_document(certified)
+    assert document["certified"] is True
+    assert document["interval"]["low"] == 0.0
+    with pytest.raises(InputError, match=r"does not end in \.json"):
+        save_certificate(certified, tmp_path / "certificate.txt")
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"format": "sarl-rules"}, "is no certificate"),
+        ({"version": 2}, "a version that this program does not read"),
+        ({"more": 1}, "'more' is not known to this version"),
+        ({"episodes": 20}, "does not hold together"),
+        ({"failures": 1}, "does not hold together"),
+        ({"certified": False}, "does not hold together"),
+        ({"certified": None}, "does not hold together"),
+        ({"at_most": 0.01}, "cannot be read"),
+        ({"at_most": 0.09}, "does not hold together"),
+        ({"at_most": 0.0}, "a rate of 0 cannot be certified"),
+        ({"seeds": {"first": 1, "last": 2}}, "does not hold together"),
+        ({"looks": {"certified": [5], "refused": []}}, "does not hold together"),
+        ({"failures": -1}, "cannot be read"),
+    ],
+)
+def test_what_does_not_hold_together_is_refused(change, sentence, certified):
+    document = json.loads(certificate_to_json(certified)) | change
+    with pytest.raises(InputError, match=sentence):
+        certificate_from(document, name="it")
+
+
+def test_what_is_no_file_of_a_certificate_is_refused(tmp_path):
+    path = tmp_path / "certificate.json"
+    for content in (b"", b"{", b"[]", b"\xff\xfe\x00", b'{"format": NaN}'):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=r"certificate\.json"):
+            load_certificate(path)
+    with pytest.raises(InputError, match="cannot be read"):
+        load_certificate(tmp_path / "nowhere.json")
+
+
+def test_the_rate_is_that_of_its_episodes(certified):
+    assert (certified.rate.count, certified.rate.of) == (0, certified.verdict.episodes)
+    assert np.isclose(certified.rate.at_most, 1 - 0.05 ** (1 / certified.verdict.episodes))
