@@ -15,6 +15,7 @@ PRINTED = {
     "scikit_learn": r"right on ([\d.]+) ?%",
     "train_under_shield": r"mean return (\d+)",
     "crane": r"broke the rules in ([\d.]+)%",
+    "prove_cartpole": r"stays on the track: for (\d+) of 500 steps",
 }
 LEAST = {
     "mine_and_shield": 100,  # alone about 22
@@ -22,6 +23,7 @@ LEAST = {
     "scikit_learn": 85,
     "train_under_shield": 9,
     "crane": 15,
+    "prove_cartpole": 150,
 }
 
 

@@ -49,6 +49,8 @@ GLOSSARY = {
     "worst tenth": "the mean of the worst tenth of the episodes (CVaR)",
     "mean of the middle half": "of the returns, without the lowest and the highest quarter "
     "(*IQM*; on some pages *typical return*); it hides crashes, so failures stand beside it",
+    "certificate": "a test of whether at most so many episodes fail, at a certainty, and all that "
+    "was tested",
     "novice": "an agent that has learned nothing: random actions",
     "held out": "of episodes: kept from mining, so that rules can be tried on them",
     "95 % interval": "where the true value lies, but for one time in twenty; wide where there are "
