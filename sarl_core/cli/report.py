@@ -57,6 +57,15 @@ def report(
             "printed. May be given several times.",
         ),
     ] = None,
+    certificate: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--certificate",
+            metavar="FILE",
+            show_default=False,
+            help="What `certify --out` wrote of these rules. May be given several times.",
+        ),
+    ] = None,
     in_full: Annotated[
         int,
         typer.Option(
@@ -112,17 +121,20 @@ def report(
         from sarl_core.explaining.report.thresholds import read_card
         from sarl_core.explaining.words.sign_off import approvals_document
         from sarl_core.mining.rule_set import RuleSet
+        from sarl_core.studies.certificate_files import load_certificate
 
         rule_set = RuleSet.load(rules)
         read = read_demonstrations(demonstrations, env, columns, missing)
         given = recoded(read, rule_set.source.features, called=called(demonstrations))
         card, sign_off = read_card(rules), sign_off_of(rule_set)
         results = [one for path in comparison or () for one in read_results(path)]
+        certificates = [load_certificate(path) for path in certificate or ()]
         options: dict[str, object] = {
             "--demonstrations": called(demonstrations),
             "--column": as_options(columns),
             "--missing": None if missing == "refuse" else missing,
             "--comparison": [called(path) for path in comparison or ()],
+            "--certificate": [called(path) for path in certificate or ()],
             "--in-full": None if in_full == _IN_FULL else in_full,
             "--frames": None if frames == _FRAMES else frames,
             **({} if env is None else env.options),
@@ -162,6 +174,7 @@ def report(
             sign_off=sign_off,
             card=card,
             comparison=results,
+            certificates=certificates,
             progress=advance,
         )
         document.save(out)

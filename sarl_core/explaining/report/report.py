@@ -19,6 +19,7 @@ from sarl_core.demonstrations.names import names_of
 from sarl_core.demonstrations.recoding import recoded
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, require
+from sarl_core.explaining.report.certificates import certificates_part
 from sarl_core.explaining.report.comparison import Result, compared
 from sarl_core.explaining.report.demonstrations import demonstrations_part
 from sarl_core.explaining.report.gaps import gaps
@@ -47,6 +48,7 @@ from sarl_core.rendering.example_frames import (
     Player,
     try_example_frames,
 )
+from sarl_core.studies.certificate import Certificate
 
 MOST_IN_FULL = 60
 MOST_FRAMES = 12
@@ -141,6 +143,7 @@ def make_report(
     sign_off: SignOff | None = None,
     card: Mapping[str, Any] | None = None,
     comparison: Sequence[Result] = (),
+    certificates: Sequence[Certificate] = (),
     trees: Sequence[PolicyTree] | None = None,
     progress: Progress | None = None,
 ) -> Report:
@@ -163,6 +166,7 @@ def make_report(
         sign_off: Who approved these very rules; None to say nothing of it.
         card: Of the rule file, as `read_card` gives it.
         comparison: Results to show.
+        certificates: Of these very rules.
         trees: Grown from the demonstrations with the rules' divider; grown here where not given
             and needed.
         progress: Called with (units done, in all) while pictures are made; returning False stops.
@@ -172,7 +176,7 @@ def make_report(
 
     Raises:
         InputError: If a number is out of range, the demonstrations have other features or actions
-            than the rules, or an agent that was named cannot play.
+            than the rules, an agent that was named cannot play, or a certificate is of other rules.
         CancelledError: If `progress` returned False.
     """
     call = "call make_report(rules, demonstrations)"
@@ -205,6 +209,7 @@ def make_report(
         trees = grow_policy_trees(
             demonstrations, divider=rule_set.divider, learner=rule_set.learner
         )
+    certified = certificates_part(as_given, certificates, card)
     order = in_order(rule_set, wishes.in_full)
     examples, without = _examples(rule_set, demonstrations, order[0], wishes, progress)
     about = demonstrations.env_id or rule_set.source.env_id
@@ -221,6 +226,7 @@ def make_report(
         frame_size=examples.size if examples is not None else (0, 0),
         gaps=gaps(rule_set, demonstrations, counts, examples),
         compared=compared(comparison),
+        certified=certified,
         again=facts(
             as_given,
             demonstrations,

@@ -1,0 +1,69 @@
+"""The part of a report that says what is certified of its rules."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from sarl_core.errors import InputError
+from sarl_core.explaining.words.certificate import LIMITS, certificate_facts
+from sarl_core.mining.rule_set import RuleSet, rules_digest
+from sarl_core.studies.certificate import Certificate
+from sarl_core.studies.certificate_files import certificate_from
+
+
+@dataclass(frozen=True)
+class CertificatesPart:
+    """What is certified, or was to be.
+
+    Attributes:
+        tables: Of each certificate names and values, the verdict first.
+        limits: What none of them says.
+    """
+
+    tables: tuple[tuple[tuple[str, str], ...], ...]
+    limits: str = LIMITS
+
+
+def certificates_part(
+    rule_set: RuleSet, given: Sequence[Certificate], card: Mapping[str, Any] | None
+) -> CertificatesPart:
+    """What is certified of rules.
+
+    Args:
+        rule_set: As they were given.
+        given: Certificates to show.
+        card: Of the rule file, which may hold one under `certificate`; None without a card.
+
+    Returns:
+        The part of the report.
+
+    Raises:
+        InputError: If a certificate is of other rules.
+    """
+    digest = rules_digest(rule_set)
+    for one in given:
+        if one.subject.rules_digest != digest:
+            raise InputError(
+                f"the certificate is of other rules ({one.subject.rules_digest}) than the report "
+                f"({digest}); certify these with `sarl certify`, or leave it out"
+            )
+    carried: list[Certificate] = []
+    with suppress(InputError):  # a card says what it can
+        carried.append(certificate_from((card or {}).get("certificate"), name="the card"))
+    known = [one for one in carried if one.subject.rules_digest == digest]
+    every = dict.fromkeys((*given, *known))
+    return CertificatesPart(tuple(_table(one) for one in every))
+
+
+def _table(certificate: Certificate) -> tuple[tuple[str, str], ...]:
+    facts = [
+        (f"{name[0].upper()}{name[1:]}", value) for name, value in certificate_facts(certificate)
+    ]
+    if certificate.made:
+        facts.append(("Made", certificate.made))
+    if certificate.command:
+        facts.append(("Made by", certificate.command))
+    return tuple(facts)
