@@ -12,11 +12,13 @@ from sarl_core.errors import SarlError
 from sarl_dashboard.components.journey.environment_needed import require_environment
 from sarl_dashboard.components.run_bar import bars_at_work
 from sarl_dashboard.components.settings import known_seeds_notice, other_data_notice
+from sarl_dashboard.jobs.certificates import CERTIFICATE
 from sarl_dashboard.jobs.episodes import COMPARISON
 from sarl_dashboard.session import end_page
 from sarl_dashboard.state.environments import demonstrated, environment_of
 from sarl_dashboard.state.rule_files import IN_FORCE
 from sarl_dashboard.text import refuse
+from sarl_dashboard.views.shield.certificate import certify_section
 from sarl_dashboard.views.shield.lines import guards, line, pilots
 from sarl_dashboard.views.shield.settings import settings
 from sarl_dashboard.views.shield.table import comparison_of
@@ -35,7 +37,7 @@ try:
     agents = pilots(choices, env_id)
 except SarlError as error:
     refuse(error)
-    bars_at_work(COMPARISON)
+    bars_at_work(COMPARISON, CERTIFICATE)
     end_page()
 shields = guards(choices)
 lines = [line(choices, env_id, agent, shield) for agent in agents for shield in shields]
@@ -44,8 +46,9 @@ if not lines:
         "Choose at least one agent and one shield; a shield of your own needs its file.",
         icon=":material/checklist:",
     )
-    bars_at_work(COMPARISON)
+    bars_at_work(COMPARISON, CERTIFICATE)
     end_page()
 if choices.from_demonstrations and demonstrated(env_id, choices.seed, choices.episodes):
     known_seeds_notice()
 comparison_of(lines, choices.episodes)
+certify_section(lines)

@@ -13,11 +13,14 @@ from pathlib import Path
 
 from sarl_core.documents import parse_json
 from sarl_core.errors import InputError, quoted
+from sarl_core.explaining.words.certificate import certificate_facts, verdict_text
 from sarl_core.files import as_path
 from sarl_core.library.file_store import content_digest
 from sarl_core.library.items import Item
 from sarl_core.library.library import Library
 from sarl_core.limits import limited_bytes
+from sarl_core.studies.certificate import Certificate
+from sarl_core.studies.certificate_files import FORMAT, certificate_from
 
 RESULT_ENDINGS = (".csv", ".gif", ".html", ".json", ".mp4", ".png")
 NOTE_ENDINGS = (".md", ".txt")
@@ -70,8 +73,8 @@ def add_result(
         What is kept.
 
     Raises:
-        InputError: If the file cannot be read, is empty, or is none of these; or as of
-            `Library.add`.
+        InputError: If the file cannot be read, is empty, is none of these, or is a certificate
+            that does not hold together; or as of `Library.add`.
         WorkError: If it cannot be written.
     """
     path = as_path(path)
@@ -85,6 +88,8 @@ def add_result(
     if not size:
         raise InputError(f"{path} is empty; give the file of a result")
     _require_form(path, ending)
+    certificate = _certificate_of(path, name=str(path)) if ending == ".json" else None
+    verdict = {} if certificate is None else {"certificate": verdict_text(certificate)}
     return library.add(
         "result",
         name or path.stem,
@@ -92,7 +97,7 @@ def add_result(
         author=author,
         digest=digest,
         came_from=standing_ids(library, about),
-        details={"file_name": path.name, **({"address": address} if address else {})},
+        details={"file_name": path.name, **({"address": address} if address else {}), **verdict},
     )
 
 
@@ -209,6 +214,10 @@ def result_view(path: Path, most: int) -> ResultView:
         ) from error
     text = content.decode("utf-8-sig", errors="replace")
     if path.suffix == ".json":
+        with suppress(InputError):  # else it is said as it stands
+            if not rest and (certificate := _certificate_of(path, name="it")) is not None:
+                facts = certificate_facts(certificate)
+                return ResultView(rows=(("what", "value"), *facts)[: most + 1])
         if not rest:
             with suppress(ValueError):  # else it is said as it stands
                 text = json.dumps(parse_json(content, finite=False), indent=1, ensure_ascii=False)
@@ -256,6 +265,21 @@ def standing_ids(library: Library, identifiers: Sequence[str]) -> list[str]:
         if item.removed is not None:
             raise InputError(f"{quoted(item.name)} was removed; bring it back first")
     return list(dict.fromkeys(item.id for item in items))
+
+
+def _certificate_of(path: Path, *, name: str) -> Certificate | None:
+    """What a file certifies; None where it is no certificate.
+
+    Raises:
+        InputError: If it is one that does not hold together.
+    """
+    try:
+        document = parse_json(file_content(path), finite=False)
+    except ValueError:
+        return None
+    if not isinstance(document, dict) or document.get("format") != FORMAT:
+        return None
+    return certificate_from(document, name=name)
 
 
 def _require_form(path: Path, ending: str) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from sarl_core import Shield, load_rules
 from sarl_core.errors import InputError
 from sarl_core.library import Item, Library, Quota
 from sarl_core.library.bundles import export_bundle, import_bundle
@@ -21,7 +22,10 @@ from sarl_core.library.results import (
     notes_about,
     result_view,
 )
+from sarl_core.studies.certificate import certify
+from sarl_core.studies.certificate_files import save_certificate
 
+DATA = Path(__file__).parents[2] / "data"
 GIF = b"GIF89a\x01\x00\x01\x00\x80\x00\x00\x00\x00\x00\xff\xff\xff,\x00\x00\x00\x00\x01\x00\x01\x00"
 CONTENTS = {
     "a.csv": b"agent,return\nnovice,22\n",
@@ -186,3 +190,20 @@ def test_a_result_travels_with_what_it_is_about(
         again = there.item(result.id)
         assert there.path(again).read_bytes() == CONTENTS["a.csv"]
         assert [one.id for one in notes_about(there, again)] == [note.id]
+
+
+def test_a_certificate_is_a_result_that_says_what_it_certifies(
+    library: Library, tmp_path: Path
+) -> None:
+    rules = Shield(load_rules(DATA / "rules" / "cartpole_compact.json"))
+    path = tmp_path / "certificate.json"
+    save_certificate(certify("CartPole-v1", "novice", rules, at_most=0.2), path)
+    item = add_result(library, path, author="Ada")
+    verdict = "Certified with 95 % certainty: at most 20 % of the episodes fail."
+    assert item.details["certificate"] == verdict
+    assert ("verdict", verdict) in result_view(library.path(item), 20).rows
+    document = json.loads(path.read_text()) | {"failures": 1}
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError, match="does not hold together"):
+        add_result(library, path, author="Ada")
+    assert result_view(path, 5).lines  # as it stands

@@ -121,7 +121,9 @@ def about(item: Item) -> str:
         number = details.get(key)
         if isinstance(number, int):
             parts.append(counted(number, noun))
-    if item.kind == "result" and item.files:
+    if "certificate" in details:
+        parts.append("a certificate")
+    elif item.kind == "result" and item.files:
         parts.append(_FORMS.get(item.files[0].ending, item.files[0].ending))
     return ", ".join(parts)
 

@@ -60,6 +60,7 @@ class ShieldLine:
         style: How it is drawn.
         agent: Name on screen.
         shield: Name on screen.
+        chosen: Makes the agent.
     """
 
     row: Row
@@ -67,6 +68,7 @@ class ShieldLine:
     style: ArmStyle
     agent: str
     shield: str
+    chosen: ChosenAgent
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,4 +150,5 @@ def line(choices: ShieldChoices, env_id: EnvironmentOrId, pilot: Pilot, guard: G
         arm_style(pilot.place, guard.place),
         pilot.name,
         guard.name,
+        pilot.agent,
     )
