@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,13 @@ from tests.app.screens import errors, finished, open_page, run_through, texts
 
 COMPACT = {"data": "cartpole", "agents": "novice", "shields": "compact", "at_most": "10"}
 RULES = Path(__file__).parents[2] / "data" / "rules" / "cartpole_compact.json"
+
+
+@pytest.fixture(autouse=True)
+def forgotten() -> Iterator[None]:
+    """What one test has certified is no other's to look at."""
+    yield
+    episode_jobs.results.clear()
 
 
 def test_a_shield_is_certified_and_the_certificate_is_kept(place: Path) -> None:

@@ -31,9 +31,8 @@ def run(app: AppTest) -> AppTest:
 
 def rows(app: AppTest) -> dict[str, dict[str, Any]]:
     """The table by agent and shield."""
-    if not app.dataframe:
-        return {}
-    found = app.dataframe[-1].value.to_dict("records")
+    tables = [table.value for table in app.dataframe if "Agent" in table.value]
+    found = tables[-1].to_dict("records") if tables else []
     return {f"{row['Agent']}, {row['Shield']}": row for row in found}
 
 
