@@ -1,7 +1,7 @@
 """Makes the pictures of the guide from the product itself: `python -m docs.scripts.pictures`.
 
-The GIFs and the crane's pictures come from the command line; the screenshots from a dashboard
-started for them.
+The GIFs, the crane's pictures and the proof's come from the command line; the screenshots from a
+dashboard started for them.
 """
 
 from __future__ import annotations
@@ -144,6 +144,20 @@ def crane() -> None:
             browser.close()
 
 
+def proof() -> None:
+    """From where it is proved that Cart Pole's pole stays up."""
+    with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
+        python(Path(name), str(ROOT / "examples" / "prove_cartpole.py"))
+        browser = _chromium(playwright)
+        page = browser.new_page(viewport={"width": 900, "height": 560})
+        page.goto((Path(name) / "proved_cartpole.html").as_uri())
+        page.wait_for_timeout(SETTLED)
+        page.screenshot(path=PICTURES / "proved.png")
+        browser.close()
+    with Image.open(PICTURES / "proved.png") as picture:
+        picture.convert("RGB").quantize(64).save(PICTURES / "proved.png", optimize=True)
+
+
 def screenshots() -> None:
     """Every screen of `SCREENS`."""
     with dashboard() as (browser, address):
@@ -245,5 +259,6 @@ if __name__ == "__main__":
     driving()
     walker()
     crane()
+    proof()
     screenshots()
     combinations()

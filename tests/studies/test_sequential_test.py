@@ -56,6 +56,12 @@ def test_a_failure_asks_for_more_episodes_and_many_refuse():
     assert (undecided.certified, undecided.episodes) == (None, 2_990)
 
 
+def test_more_episodes_go_on_where_fewer_ended():
+    few, many = sequential_test(0.02), sequential_test(0.02, 0.95, 6_000)
+    assert many.certified[: len(few.certified)] == few.certified
+    assert many.refused[: len(few.refused) - 1] == few.refused[:-1]
+
+
 def test_what_is_not_known_counts_against_both_verdicts():
     test = sequential_test(0.01)
     unknown = failures(200)
