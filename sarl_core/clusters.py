@@ -9,7 +9,7 @@ from __future__ import annotations
 import atexit
 import logging
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
 from typing import Any, ParamSpec, TypeVar
@@ -180,6 +180,25 @@ def losses() -> tuple[type[Exception], ...]:
     from distributed.comm.core import CommClosedError
 
     return KilledWorker, CommClosedError, CancelledError
+
+
+def worked_out(futures: Sequence[Any], advance: Callable[[float], None]) -> Sequence[Any]:
+    """Wait until all are worked out, where they are.
+
+    Args:
+        futures: Of a ``distributed.Client``.
+        advance: Given the share that is done.
+
+    Returns:
+        The same.
+    """
+    from distributed import as_completed
+
+    for done, future in enumerate(as_completed(futures), start=1):
+        if future.status == "error":
+            future.result()  # raises
+        advance(done / len(futures))
+    return futures
 
 
 @contextmanager

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from sarl_core.auditing.audit import Audit
-from sarl_core.auditing.drift import Moved, Shares, by_episode, differences, moved, rule_counts
+from sarl_core.auditing.drift import Moved, Shares, differences, moved
+from sarl_core.auditing.numbers import AuditNumbers
 from sarl_core.mining.evidence import FEWEST_EPISODES
 
 
@@ -22,13 +22,13 @@ class LogComparison:
         after: The second.
     """
 
-    before: Audit
-    after: Audit
+    before: AuditNumbers
+    after: AuditNumbers
 
     @property
     def is_known(self) -> bool:
         """Whether both have enough episodes for intervals."""
-        return min(one.log.n_episodes for one in (self.before, self.after)) >= FEWEST_EPISODES
+        return min(one.n_episodes for one in (self.before, self.after)) >= FEWEST_EPISODES
 
     @cached_property
     def differences(self) -> tuple[Moved, ...]:
@@ -57,17 +57,13 @@ class LogComparison:
         }
 
 
-def _shares(audit: Audit) -> Shares:
-    starts, size = audit.log.episode_starts, len(audit.rule_set)
-    broken = np.where(audit.breaks, audit.rules, -1)
-    columns = (audit.is_covered, audit.is_broken, audit.outside, audit.near >= 0)
+def _shares(audit: AuditNumbers) -> Shares:
+    counts, size = audit.counts, len(audit.rule_set)
+    columns = (counts.covered, counts.broken, counts.outside, counts.near)
+    rules = (counts.rules.applied, counts.rules.broken)
     return Shares(
         np.hstack(
-            [
-                np.stack([by_episode(column, starts) for column in columns], axis=1),
-                rule_counts(audit.rule_set, audit.rules, starts)[:, :size],
-                rule_counts(audit.rule_set, broken, starts)[:, :size],
-            ]
-        ),
-        audit.log.episode_lengths.astype(np.float64),
+            [np.stack(columns, axis=1), *(counts.by_rule(values, size) for values in rules)]
+        ).astype(np.float64),
+        counts.steps.astype(np.float64),
     )

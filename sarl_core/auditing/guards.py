@@ -8,17 +8,17 @@ import re
 from collections.abc import Callable
 from typing import NamedTuple
 
-from sarl_core.auditing.audit import Audit
+from sarl_core.auditing.numbers import AuditNumbers
 from sarl_core.errors import InputError, quoted
 
 _COMPARED = {">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le}
 _FORM = re.compile(r"\s*(\w+)\s*(>=|<=|>|<)\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*(%?)\s*")
 
-MEASURES: dict[str, Callable[[Audit], float]] = {
+MEASURES: dict[str, Callable[[AuditNumbers], float]] = {
     "breaks": lambda audit: audit.broken / audit.steps,
     "coverage": lambda audit: audit.coverage,
     "agreement": lambda audit: audit.agreement,
-    "outside": lambda audit: float(audit.outside.mean()),
+    "outside": lambda audit: audit.outside_count / audit.steps,
     "near": lambda audit: audit.near_share,
     "freedom": lambda audit: audit.freedom,
     "longest_run": lambda audit: float(audit.longest_run),
@@ -49,11 +49,11 @@ class GuardCondition(NamedTuple):
     sign: str
     number: float
 
-    def value(self, audit: Audit) -> float:
+    def value(self, audit: AuditNumbers) -> float:
         """What the measure is in an audit; NaN where it has none, as agreement without coverage."""
         return MEASURES[self.measure](audit)
 
-    def holds(self, audit: Audit) -> bool:
+    def holds(self, audit: AuditNumbers) -> bool:
         """Whether it holds; a guard that cannot know counts as if it did."""
         value = self.value(audit)
         return math.isnan(value) or bool(_COMPARED[self.sign](value, self.number))

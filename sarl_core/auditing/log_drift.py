@@ -5,24 +5,23 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.auditing.counts import LogCounts
 from sarl_core.auditing.drift import (
     Drift,
     Moved,
     Shares,
     against_expected,
-    by_episode,
     differences,
     moved,
     quarters,
     rule_counts,
 )
-from sarl_core.auditing.matching import MatchedLog
+from sarl_core.auditing.feature_counts import Edges, numbers_and_words, quarter_counts
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.language import number_text
 from sarl_core.mining.rule_set import RuleSet
 
 _BEYOND = 0.02  # of a rule's own states lie outside their 1 % and 99 % quantiles
-_HALF = 0.5  # of a feature that says which word a column holds
 
 
 def _rule_names(rule_set: RuleSet) -> list[tuple[str, str]]:
@@ -34,27 +33,19 @@ def _rule_names(rule_set: RuleSet) -> list[tuple[str, str]]:
     ]
 
 
-def drift_from_rules(
-    rule_set: RuleSet,
-    log: Demonstrations,
-    matched: MatchedLog,
-    in_force: NDArray[np.int64],
-) -> Drift:
+def drift_from_rules(rule_set: RuleSet, counts: LogCounts) -> Drift:
     """Compare with what a rule file keeps of the demonstrations: supports, and data boxes.
 
     Args:
         rule_set: R rules.
-        log: N steps in E episodes.
-        matched: The same as the rules see it.
-        in_force: Index of the rule in force or -1, (N, m).
+        counts: Of the log, with `beyond_counts` as what is counted of features.
 
     Returns:
         What moved.
     """
-    starts = log.episode_starts
-    lengths = log.episode_lengths.astype(np.float64)
+    lengths = counts.steps.astype(np.float64)
     size, episodes = len(rule_set), rule_set.source.episodes
-    counts = rule_counts(rule_set, in_force, starts)
+    in_force = counts.in_force(size).astype(np.float64)
     # A rule of a person's own says nothing of how often it applied, nor one that is switched off.
     known = [place for place, rule in enumerate(rule_set) if rule.enabled and not rule.placed]
     expected = [rule_set[place].support for place in known]
@@ -65,14 +56,15 @@ def drift_from_rules(
             for dimension in range(len(rule_set.actions))
         ]
     names = [_rule_names(rule_set)[place] for place in known]
-    rules = against_expected(Shares(counts[:, known], lengths), np.array(expected), episodes)
-    beyond, ruled, usual = _beyond(rule_set, matched.observations, in_force, starts)
+    rules = against_expected(Shares(in_force[:, known], lengths), np.array(expected), episodes)
     features: tuple[Moved, ...] = ()
     # A word has no middle; whether it is one that a rule has never met, the breaks outside say.
-    numbers = [at for at, one in enumerate(rule_set.source.features) if one.indicator is None]
+    numbers, _ = numbers_and_words(rule_set)
+    ruled = counts.boxed.astype(np.float64)
     if ruled.sum() and numbers:
-        shares = Shares(beyond[:, numbers], ruled)
-        before, now, low, high = against_expected(shares, usual[numbers], episodes)
+        usual = np.full(len(numbers), _usual_share(rule_set, in_force[:, :size].sum(axis=0)))
+        shares = Shares(counts.features[:, numbers].astype(np.float64), ruled)
+        before, now, low, high = against_expected(shares, usual, episodes)
         said = "states outside the middle 98 % of the data of the rule that applies"
         features = moved(
             [(rule_set.source.features[at].name, said) for at in numbers],
@@ -83,91 +75,77 @@ def drift_from_rules(
         "what the rules say of their demonstrations",
         features,
         moved(names, rules),
-        (len(starts), episodes),
+        (len(counts.steps), episodes),
     )
 
 
-def _beyond(
-    rule_set: RuleSet,
-    observations: NDArray[np.float32],
-    in_force: NDArray[np.int64],
-    starts: NDArray[np.int64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Steps whose feature lies outside the middle of the data of the rule in force.
+def _usual_share(rule_set: RuleSet, applied: NDArray[np.float64]) -> float:
+    """The share of states outside: of n, about 2 / n of others like them lie outside all of them.
 
-    Returns:
-        Such steps (E, d), all steps of rules that keep a box (E,), and the share that is usual
-        (d,): of n states, about 2 / n of others like them lie outside all of them.
+    Args:
+        rule_set: R rules.
+        applied: Steps in which each is in force, (R,); one or more of a rule that keeps a box.
     """
-    d = observations.shape[1]
-    counts, ruled = np.zeros((len(starts), d)), np.zeros(len(starts))
-    usual = 0.0
-    boxes = [rule.box for rule in rule_set]
-    has_box = np.array([box is not None for box in boxes] + [False])
-    low, high = np.zeros((2, len(boxes), d))
-    for place, box in enumerate(boxes):
-        if box is not None:
-            low[place], high[place] = box.low, box.high
+    boxed = np.array([rule.box is not None for rule in rule_set])
     chance = np.array([min(_BEYOND + 2.0 / (rule.samples + 1), 1.0) for rule in rule_set])
-    for column in in_force.T:
-        known = has_box[column]
-        ruled += by_episode(known, starts)
-        rules = np.where(known, column, 0)
-        usual += float(chance[rules][known].sum()) if len(boxes) else 0.0
-        for feature in range(d if len(boxes) else 0):
-            values = observations[:, feature]
-            out = (values < low[rules, feature]) | (values > high[rules, feature])
-            counts[:, feature] += by_episode(out & known, starts)
-    return counts, ruled, np.full(d, usual / max(ruled.sum(), 1.0))
+    return float((chance * applied)[boxed].sum() / applied[boxed].sum())
 
 
-def drift_from_demonstrations(
-    rule_set: RuleSet,
-    now: tuple[Demonstrations, NDArray[np.float32], NDArray[np.int64]],
-    before: tuple[Demonstrations, NDArray[np.float32], NDArray[np.int64]],
-) -> Drift:
+def drift_from_demonstrations(rule_set: RuleSet, counts: LogCounts, edges: Edges) -> Drift:
     """Compare distributions: where the quarters of each feature lie, and each rule's share.
 
     Args:
         rule_set: R rules.
-        now: The log, its observations as the rules see them (N, d), and the index of the rule in
-            force or -1, (N, m).
-        before: The same of the demonstrations.
+        counts: Of the log, with `quarter_counts` as what is counted of features.
+        edges: Of the demonstrations.
 
     Returns:
         What moved.
     """
     features = rule_set.source.features
-    numbers = [at for at, one in enumerate(features) if one.indicator is None]
-    words = [at for at, one in enumerate(features) if one.indicator is not None]
-    edges = quarters(before[1])
-    sides = []
-    for log, observations, in_force in (now, before):
-        starts = log.episode_starts
-        sides.append(
-            Shares(
-                np.hstack(
-                    [
-                        *(by_episode((observations <= edge)[:, numbers], starts) for edge in edges),
-                        by_episode(observations[:, words] > _HALF, starts),
-                        rule_counts(rule_set, in_force, starts),
-                    ]
-                ),
-                log.episode_lengths.astype(np.float64),
-            )
-        )
+    numbers, words = numbers_and_words(rule_set)
+    now = np.hstack([counts.features, counts.in_force(len(rule_set))]).astype(np.float64)
     names = [
         (
             features[at].name,
             f"states at or below {number_text(float(row[at]))} {features[at].unit}".rstrip(),
         )
-        for row in edges
+        for row in edges.quarters
         for at in numbers
     ] + [(features[at].statement(True), "states in which it is so") for at in words]
-    all_moved = moved([*names, *_rule_names(rule_set)], differences(sides[0], sides[1]))
+    shares = Shares(now, counts.steps.astype(np.float64))
+    all_moved = moved([*names, *_rule_names(rule_set)], differences(shares, edges.before))
     return Drift(
         "the demonstrations",
         all_moved[: len(names)],
         all_moved[len(names) :],
-        (now[0].n_episodes, before[0].n_episodes),
+        (len(counts.steps), len(edges.before.steps)),
     )
+
+
+def edges_of(
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+    observations: NDArray[np.float32],
+    in_force: NDArray[np.int64],
+) -> Edges:
+    """What logs are compared with, of demonstrations.
+
+    Args:
+        rule_set: R rules.
+        demonstrations: N steps.
+        observations: Their states as the rules see them, (N, d).
+        in_force: Index of the rule in force or -1, (N, m).
+
+    Returns:
+        Little of them.
+    """
+    cuts, starts = quarters(observations), demonstrations.episode_starts
+    counts = np.hstack(
+        [
+            quarter_counts(rule_set, observations, starts, cuts),
+            rule_counts(rule_set, in_force, starts),
+        ]
+    )
+    lengths = demonstrations.episode_lengths.astype(np.float64)
+    return Edges(cuts, Shares(counts.astype(np.float64), lengths))

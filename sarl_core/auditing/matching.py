@@ -63,13 +63,7 @@ def matched_log(rule_set: RuleSet, log: Demonstrations, *, called: str = "the lo
         InputError: If the log lacks a feature or an action that the rules speak of, has it in
             another unit, or holds a label that the rules do not know.
     """
-    log = recoded(log, rule_set.source.features, called=called)
-    places, notes = _feature_places(rule_set, log, called)
-    observations = log.raw_observations
-    if places != list(range(observations.shape[1])):
-        observations = np.ascontiguousarray(observations[:, places])
-    observations = extend(observations, rule_set.source.features)
-    _check_units(rule_set, log, places, called)
+    observations, notes = matched_states(rule_set, log, called=called)
     order, more = _action_places(rule_set, log, called)
     notes += more
     labels = np.empty((len(log), len(rule_set.actions)), dtype=np.int64)
@@ -87,6 +81,24 @@ def matched_log(rule_set: RuleSet, log: Demonstrations, *, called: str = "the lo
             actions[:, column] = np.array(dimension.actions)[labels[:, column]]
     single = len(rule_set.actions) == 1 and not rule_set.actions[0].is_interval
     return MatchedLog(observations, labels, actions[:, 0] if single else actions, notes)
+
+
+def matched_states(
+    rule_set: RuleSet, log: Demonstrations, *, called: str = "the log"
+) -> tuple[NDArray[np.float32], tuple[str, ...]]:
+    """The states of a log alone; arguments and errors as of `matched_log`.
+
+    Returns:
+        Its `observations`, and notes.
+    """
+    log = recoded(log, rule_set.source.features, called=called)
+    places, notes = _feature_places(rule_set, log, called)
+    observations = log.raw_observations
+    if places != list(range(observations.shape[1])):
+        observations = np.ascontiguousarray(observations[:, places])
+    observations = extend(observations, rule_set.source.features)
+    _check_units(rule_set, log, places, called)
+    return observations, notes
 
 
 class UnmatchedNames(NamedTuple):

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.distributed.survey import Keys, episode_keys
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.neighbourhood import feature_spreads
 
@@ -16,19 +18,49 @@ NEAR = 0.1
 """Of a feature's spread (its interquartile range): what a near miss is away at most."""
 
 _MOST_TESTS = 400_000_000  # of a state with a rule; beyond, some of the states are looked at
-_SAMPLE = 100_000  # states that tell how far a feature spreads
+SAMPLE = 100_000
+"""States that say how far a feature spreads."""
 
 
-def spreads_of(observations: NDArray[np.float32]) -> NDArray[np.float64]:
-    """What a change of each feature is measured in, from evenly chosen states.
+def sample_keys(log: Demonstrations) -> Keys:
+    """A number by chance for each step, by the numbers of its episode and of the step.
+
+    Args:
+        log: N steps.
+
+    Returns:
+        Shape (N,); a step has the same one wherever it stands.
+    """
+    assert log.steps is not None
+    return episode_keys(episode_keys(log.episodes.astype(np.uint64)) + log.steps.astype(np.uint64))
+
+
+def in_sample(keys: Keys) -> NDArray[np.bool_]:
+    """Which steps say how far a feature spreads.
+
+    Args:
+        keys: Of N steps.
+
+    Returns:
+        Shape (N,): about `SAMPLE`, those with the least keys, so that those of some logs together
+        are among those of each; all of fewer.
+    """
+    if len(keys) <= SAMPLE:
+        return np.ones(len(keys), dtype=np.bool_)
+    return np.asarray(keys <= np.partition(keys, SAMPLE - 1)[SAMPLE - 1])
+
+
+def spreads_of(observations: NDArray[np.float32], keys: Keys) -> NDArray[np.float64]:
+    """What a change of each feature is measured in.
 
     Args:
         observations: Shape (N, d).
+        keys: Of `sample_keys`, (N,).
 
     Returns:
         Shape (d,), above 0.
     """
-    return feature_spreads(observations[:: max(len(observations) // _SAMPLE, 1)])
+    return feature_spreads(observations[in_sample(keys)])
 
 
 def looked_at(rule_set: RuleSet, steps: int) -> int:

@@ -21,7 +21,7 @@ from sarl_core import (
 from sarl_core.auditing.comparison import LogComparison
 from sarl_core.auditing.guards import guard
 from sarl_core.auditing.matching import unmatched_names
-from sarl_core.auditing.near import NEAR, spreads_of
+from sarl_core.auditing.near import NEAR, sample_keys, spreads_of
 from sarl_core.shielding.neighbourhood import Neighbourhood
 
 NAMES = ("wind", "load", "height", "a", "b", "c", "d", "e")
@@ -93,7 +93,7 @@ def test_near_misses_are_those_of_what_if(
     audited: Audit, rules: RuleSet, demonstrations: Demonstrations
 ) -> None:
     neighbourhood = Neighbourhood(Shield(rules))
-    spreads = spreads_of(demonstrations.observations)
+    spreads = spreads_of(demonstrations.observations, sample_keys(demonstrations))
     near = 0
     for row in range(300):
         misses = neighbourhood.near_misses(demonstrations.observations[row], spreads, most=1000)

@@ -14,7 +14,13 @@ from sarl_core.demonstrations.dataset import Demonstrations, derived_over
 from sarl_core.demonstrations.fields import ColumnUse, Indicator
 from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
-from sarl_core.demonstrations.formats.missing import Missing, complete_rows
+from sarl_core.demonstrations.formats.missing import (
+    Gaps,
+    Holes,
+    Missing,
+    complete_rows,
+    gaps_of,
+)
 from sarl_core.demonstrations.requirements import (
     EXACT,
     FEW_VALUES,
@@ -290,21 +296,51 @@ def _with_short_numbers(recording: Recording) -> Recording:
         return recording
     if not episodes.size or -EXACT <= int(episodes.min()) <= int(episodes.max()) <= EXACT:
         return recording
-    called = _called(recording, "episode")
-    note = f"the episodes of {called} are numbered from 0, {episodes[0]} first"
+    note = numbered_note(_called(recording, "episode"), str(episodes[0]))
     return replace(
         recording, episodes=counted_as_they_come(episodes), notes=(*recording.notes, note)
     )
 
 
-def _complete(recording: Recording, missing: Missing) -> Recording:
-    """Refuse or leave out steps without one of their values, and check the rewards."""
+def numbered_note(column: str, first: str) -> str:
+    """That episodes got other numbers than their column has.
+
+    Args:
+        column: As messages call it.
+        first: What the first of them is called there.
+
+    Returns:
+        The note.
+    """
+    return f"the episodes of {column} are numbered from 0, {first} first"
+
+
+def gaps_in(recording: Recording, missing: Missing) -> Gaps:
+    """How many steps of a table lack one of their values, before it is completed.
+
+    Args:
+        recording: What the table holds, a row a step.
+        missing: What becomes of such steps.
+
+    Returns:
+        Those that `to_demonstrations` would leave out.
+    """
+    return gaps_of(*_holes(recording, missing), len(recording.actions))
+
+
+def _holes(recording: Recording, missing: Missing) -> tuple[Holes, Holes]:
+    """Where columns have no value, and where they have an infinite one."""
     holes = _marked(recording, np.isnan)
     if recording.missing_actions is not None:
         without = zip(recording.action_columns, recording.missing_actions.T, strict=True)
         holes |= {name: hole for name, hole in without if hole.any()}
     # A state with an infinite value is none either; it is refused by its own name.
-    infinite = _marked(recording, np.isinf) if missing == "drop" else {}
+    return holes, _marked(recording, np.isinf) if missing == "drop" else {}
+
+
+def _complete(recording: Recording, missing: Missing) -> Recording:
+    """Refuse or leave out steps without one of their values, and check the rewards."""
+    holes, infinite = _holes(recording, missing)
     if holes or infinite:
         episodes, steps = _some(recording.episodes), recording.steps
         left, note = complete_rows(holes, infinite, recording.rows, missing)

@@ -33,7 +33,7 @@ from sarl_core.demonstrations.formats.mapping.joined import joined, one_action_n
 from sarl_core.demonstrations.formats.mapping.roles import Roles, names_in
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
-from sarl_core.demonstrations.formats.recording import Recording
+from sarl_core.demonstrations.formats.recording import Recording, numbered_note
 from sarl_core.demonstrations.formats.times import as_clock, of_words, with_seconds
 from sarl_core.demonstrations.formats.units import without_units
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
@@ -195,7 +195,7 @@ def without_times(
         return guess, left, ()
     codes, words = left[episode].values, left[episode].words
     left[episode] = TableColumn(counted_as_they_come(codes), left[episode].missing)
-    note = f"the episodes of column {episode!r} are numbered from 0, {words[codes[0]]!r} first"
+    note = numbered_note(f"column {episode!r}", repr(words[codes[0]]))
     return guess, left, (note,)
 
 

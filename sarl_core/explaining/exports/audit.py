@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from sarl_core.auditing.audit import Audit
 from sarl_core.auditing.comparison import LogComparison
 from sarl_core.auditing.drift import Moved
+from sarl_core.auditing.numbers import AuditNumbers
 from sarl_core.errors import InputError, WorkError
 from sarl_core.explaining.html.table import Column, table_html
 from sarl_core.explaining.tables.spreadsheet_cells import safe_cells
@@ -32,17 +33,17 @@ _MOST_ROWS = 100  # of a table that is read
 
 
 def save_audit(
-    audit: Audit,
+    audit: AuditNumbers,
     folder: Path,
     *,
     title: str,
     comparison: LogComparison | None = None,
     sign_off: SignOff | None = None,
 ) -> None:
-    """Write an audit into a folder: `audit.json`, `audit.html`, and three tables as CSV.
+    """Write an audit into a folder: `audit.json`, `audit.html`, and tables as CSV.
 
     Args:
-        audit: Rules against a log.
+        audit: Rules against a log; where its steps are elsewhere, there is no table of them.
         folder: Made if it is not there; the folder above it has to be.
         title: Of the page.
         comparison: With another log, or None.
@@ -64,11 +65,12 @@ def save_audit(
     _write(folder / "audit.html", page)
     _write_table(audit.rule_table(), folder / "rules.csv")
     _write_table(audit.episodes, folder / "episodes.csv")
-    _write_table(audit.to_frame(), folder / "steps.csv")
+    if isinstance(audit, Audit):
+        _write_table(audit.to_frame(), folder / "steps.csv")
 
 
 def audit_document(
-    audit: Audit, comparison: LogComparison | None = None, sign_off: SignOff | None = None
+    audit: AuditNumbers, comparison: LogComparison | None = None, sign_off: SignOff | None = None
 ) -> dict[str, Any]:
     """An audit as JSON has it.
 
@@ -87,7 +89,7 @@ def audit_document(
 
 
 def audit_html(
-    audit: Audit,
+    audit: AuditNumbers,
     *,
     title: str,
     comparison: LogComparison | None = None,
@@ -123,7 +125,7 @@ def audit_html(
     )
 
 
-def broken_rules_html(audit: Audit) -> Markup:
+def broken_rules_html(audit: AuditNumbers) -> Markup:
     """The rules that were broken, the most often first, as a table.
 
     Args:
@@ -165,11 +167,11 @@ def broken_rules_html(audit: Audit) -> Markup:
     return table_html(columns, rows, "Rules that were broken")
 
 
-def _episodes(audit: Audit) -> Markup:
+def _episodes(audit: AuditNumbers) -> Markup:
     table = audit.episodes.sort_values("broken", ascending=False, kind="stable").head(_MOST_ROWS)
     titles = ["Episode", "Steps", "With a rule", "Broken", "Longest run", "Near misses"]
     names = ["episode", "steps", "covered", "broken", "longest_run", "near"]
-    if audit.clock is not None:
+    if audit.time is not None:
         titles += ["Breaks a minute", "In the worst minute"]
         names += ["breaks_per_minute", "worst_minute"]
     columns = tuple(Column(title, "n") for title in titles)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from sarl_core.auditing.audit import Audit, Stretch
 from sarl_core.auditing.clock import GAP
 from sarl_core.auditing.comparison import LogComparison
+from sarl_core.auditing.counts import Stretch
 from sarl_core.auditing.drift import Drift, Moved
 from sarl_core.auditing.near import NEAR
+from sarl_core.auditing.numbers import AuditNumbers
 from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.language import counted, share_text
 
@@ -14,7 +15,7 @@ _LISTED = 5
 _UNITS = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 
-def audit_facts(audit: Audit) -> list[tuple[str, str]]:
+def audit_facts(audit: AuditNumbers) -> list[tuple[str, str]]:
     """The numbers of an audit, with what each counts.
 
     Args:
@@ -33,7 +34,7 @@ def audit_facts(audit: Audit) -> list[tuple[str, str]]:
     )
     every = "" if audit.looked_at == 1 else f", of every {audit.looked_at}th step"
     facts = [
-        ("steps", f"{steps:,} in {counted(audit.log.n_episodes, 'episode')}"),
+        ("steps", f"{steps:,} in {counted(audit.n_episodes, 'episode')}"),
         ("coverage", f"{share_text(audit.coverage)}: {counted(audit.covered, 'step')} with a rule"),
         (
             "agreement",
@@ -48,7 +49,7 @@ def audit_facts(audit: Audit) -> list[tuple[str, str]]:
         ),
         ("breaks a minute", _pace_text(audit)),
         ("longest run", counted(audit.longest_run, "step") + _lasting(audit)),
-        ("outside", f"{counted(int(audit.outside.sum()), 'break')} where the rule has no data"),
+        ("outside", f"{counted(audit.outside_count, 'break')} where the rule has no data"),
         (
             "near misses",
             f"{counted(audit.near_count, 'step')} ({share_text(audit.near_share)}{every}): one "
@@ -64,13 +65,13 @@ def audit_facts(audit: Audit) -> list[tuple[str, str]]:
                 f"{counted(audit.missing_steps, 'step')}",
             )
         )
-    clock = audit.clock
-    if clock is not None and len(clock.gaps):
+    time = audit.time
+    if time is not None and time.gaps:
         facts.append(
             (
                 "gaps in time",
-                f"{counted(len(clock.gaps), 'jump')} of more than {GAP} steps, or back, within "
-                f"episodes; the longest of {duration_text(clock.longest_gap)}",
+                f"{counted(time.gaps, 'jump')} of more than {GAP} steps, or back, within "
+                f"episodes; the longest of {duration_text(time.longest_gap)}",
             )
         )
     return facts
@@ -89,9 +90,9 @@ def duration_text(seconds: float) -> str:
     return f"{seconds / size:.3g} {unit}"
 
 
-def _pace_text(audit: Audit) -> str:
-    clock, minute = audit.clock, audit.worst_minute
-    if clock is None:
+def _pace_text(audit: AuditNumbers) -> str:
+    time, minute = audit.time, audit.worst_minute
+    if time is None:
         return (
             "not known, as the log has no times: say which column holds them (--column t=time), or "
             "call it time"
@@ -103,18 +104,18 @@ def _pace_text(audit: Audit) -> str:
         f"{minute.episode}"
     )
     return (
-        f"{audit.breaks_per_minute:.3g} in {duration_text(60 * clock.minutes)} with a step every "
-        f"{duration_text(clock.step)}{worst}"
+        f"{audit.breaks_per_minute:.3g} in {duration_text(60 * time.minutes)} with a step every "
+        f"{duration_text(time.step)}{worst}"
     )
 
 
-def _lasting(audit: Audit) -> str:
+def _lasting(audit: AuditNumbers) -> str:
     """How long the longest run lasts, where that is known."""
     seconds = audit.worst[0].seconds if audit.worst else None
     return "" if seconds is None else f" ({duration_text(seconds)})"
 
 
-def stretch_text(audit: Audit, stretch: Stretch) -> str:
+def stretch_text(audit: AuditNumbers, stretch: Stretch) -> str:
     """A stretch of breaks in a sentence.
 
     Args:

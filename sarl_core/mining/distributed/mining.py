@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.clusters import cluster as connected
-from sarl_core.clusters import saying_losses
+from sarl_core.clusters import saying_losses, worked_out
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.fields import Whole
 from sarl_core.demonstrations.formats.columns import Columns, stated
@@ -189,8 +189,7 @@ def mine_on_cluster(
             layout = replace(layout, sample=layout.sample.deriving(mined.derived))
         placement = layout.placement(held_out)
         borders = BinnedStates.of(mined.observations).borders
-        rows = _persisted(
-            client,
+        rows = worked_out(
             [
                 client.submit(bin_piece, piece, reading, placement, borders, plan.divider)
                 for piece in pieces
@@ -225,8 +224,7 @@ def mine_on_cluster(
         del rows, counted
         total = added_up(
             client,
-            _persisted(
-                client,
+            worked_out(
                 [
                     client.submit(count_piece, piece, reading, placement, structures, plan.divider)
                     for piece in pieces
@@ -248,22 +246,8 @@ def _surveyed(
     if reading.columns is None:
         reading = replace(reading, columns=columns_of_head(first.head))
     futures = [client.submit(survey_piece, piece, reading, share) for piece in pieces[1:]]
-    surveys = [first, *(one.result() for one in _persisted(client, futures, advance))]
+    surveys = [first, *(one.result() for one in worked_out(futures, advance))]
     return layout_of(pieces, surveys), reading
-
-
-def _persisted(
-    client: Any, futures: Sequence[Any], advance: Callable[[float], None]
-) -> Sequence[Any]:
-    """Wait until all are worked out, where they are, and say how far it is."""
-    from distributed import as_completed
-
-    waiting = as_completed(futures)
-    for done, future in enumerate(waiting, start=1):
-        if future.status == "error":
-            future.result()  # raises
-        advance(done / len(futures))
-    return futures
 
 
 def _held_out(layout: Layout, plan: ClusterPlan) -> NDArray[np.int64]:

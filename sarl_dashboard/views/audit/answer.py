@@ -47,7 +47,7 @@ def show_answer(logs: Logs) -> None:
         ("Broken", f"{held.broken:,}", "breaks"),
         (
             "Breaks a minute",
-            "–" if held.clock is None else f"{held.breaks_per_minute:.3g}",
+            "–" if held.time is None else f"{held.breaks_per_minute:.3g}",
             "breaks a minute",
         ),
         ("Longest run", f"{held.longest_run:,}", "longest run"),

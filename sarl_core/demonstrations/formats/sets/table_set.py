@@ -86,7 +86,9 @@ class TableSet:
         if self.marks is not None and _EPISODE in columns.used:
             joined[_EPISODE] = TableColumn(np.cumsum(np.concatenate(begins)) - 1)
         elif columns.episode is not None:
-            joined[columns.episode] = _renumbered(joined[columns.episode], list(map(len, begins)))
+            column = joined[columns.episode]
+            numbers = renumbered(column.values, list(map(len, begins)))
+            joined[columns.episode] = replace(column, values=numbers)
         return {name: joined[name] for name in columns.used}
 
 
@@ -122,10 +124,21 @@ def open_tables(files: FileSet) -> tuple[Table, tuple[str, ...]]:
     if first.episode is None and _EPISODE not in tables[0].names:
         marks = {role: name for role, name in first.singles.items() if role in _MARKS}
     table = TableSet(tuple(paths), tuple(tables), marks, size)
-    first_file, last_file = (PurePosixPath(path).name for path in (paths[0], paths[-1]))
-    how = f"{len(paths):,} files were read as one set, from {first_file!r} to {last_file!r}"
     each = "" if marks is None else "; each begins an episode, as no column numbers them"
-    return table, (f"{how}{each}",)
+    return table, (f"{one_set_note(paths)}{each}",)
+
+
+def one_set_note(paths: Sequence[str]) -> str:
+    """That several files are one.
+
+    Args:
+        paths: Of the files, two or more, in their order.
+
+    Returns:
+        The note.
+    """
+    first, last = (PurePosixPath(path).name for path in (paths[0], paths[-1]))
+    return f"{len(paths):,} files were read as one set, from {first!r} to {last!r}"
 
 
 def _tables_among(files: FileSet) -> list[str]:
@@ -237,11 +250,18 @@ def _joined_words(
     return TableColumn(np.concatenate(values).astype(np.int64), missing, words)
 
 
-def _renumbered(column: TableColumn, lengths: Sequence[int]) -> TableColumn:
-    """The numbers of episodes, where those of each file begin again."""
-    values: NDArray[Any] = column.values
+def renumbered(values: NDArray[Any], lengths: Sequence[int]) -> NDArray[Any]:
+    """The numbers of episodes, where those of each file begin again.
+
+    Args:
+        values: Of all files, one file after the other: a number a row, or a number an episode.
+        lengths: How many are of each file.
+
+    Returns:
+        As many; the same where each episode has a number of its own, or goes on in the next file.
+    """
     if values.dtype.kind not in "iu":
-        return column
+        return values
     ends = np.cumsum(lengths)
     parts = np.split(values.astype(np.int64), ends[:-1])
     seen: set[int] = set()
@@ -251,15 +271,15 @@ def _renumbered(column: TableColumn, lengths: Sequence[int]) -> TableColumn:
             break
         seen |= numbers
     else:
-        return column  # each episode has a number of its own
+        return values  # each episode has a number of its own
     if _continues(parts):
-        return column
+        return values
     after = 0
     numbered = []
     for part in parts:
         numbered.append(part - part.min() + after)
         after = int(numbered[-1].max()) + 1
-    return TableColumn(np.concatenate(numbered), column.missing)
+    return np.concatenate(numbered)
 
 
 def _continues(parts: Sequence[NDArray[np.int64]]) -> bool:
