@@ -104,6 +104,19 @@ def counted_as_they_come(values: NDArray[Any]) -> NDArray[np.int64]:
     return np.argsort(np.argsort(first))[places.reshape(-1)]
 
 
+def numbered_note(column: str, first: str) -> str:
+    """That episodes got other numbers than their column has.
+
+    Args:
+        column: As messages call it.
+        first: What the first of them is called there.
+
+    Returns:
+        The note.
+    """
+    return f"the episodes of {column} are numbered from 0, {first} first"
+
+
 def indicators_of(column: str, words: Sequence[str]) -> tuple[Indicator, ...]:
     """The features that say which word a column holds.
 

@@ -39,7 +39,7 @@ from sarl_core.demonstrations.requirements import (
     whole_numbers_note,
     without_fraction,
 )
-from sarl_core.demonstrations.words import by_name, counted_as_they_come
+from sarl_core.demonstrations.words import by_name, counted_as_they_come, numbered_note
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
 from sarl_core.environments.feature_order import NamedFeatures, line_up, numbered, only_counts
 from sarl_core.errors import InputError, quoted
@@ -300,19 +300,6 @@ def _with_short_numbers(recording: Recording) -> Recording:
     return replace(
         recording, episodes=counted_as_they_come(episodes), notes=(*recording.notes, note)
     )
-
-
-def numbered_note(column: str, first: str) -> str:
-    """That episodes got other numbers than their column has.
-
-    Args:
-        column: As messages call it.
-        first: What the first of them is called there.
-
-    Returns:
-        The note.
-    """
-    return f"the episodes of {column} are numbered from 0, {first} first"
 
 
 def gaps_in(recording: Recording, missing: Missing) -> Gaps:

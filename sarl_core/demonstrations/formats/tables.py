@@ -33,11 +33,17 @@ from sarl_core.demonstrations.formats.mapping.joined import joined, one_action_n
 from sarl_core.demonstrations.formats.mapping.roles import Roles, names_in
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
-from sarl_core.demonstrations.formats.recording import Recording, numbered_note
+from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.times import as_clock, of_words, with_seconds
 from sarl_core.demonstrations.formats.units import without_units
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
-from sarl_core.demonstrations.words import Coded, counted_as_they_come, indicated, indicators_of
+from sarl_core.demonstrations.words import (
+    Coded,
+    counted_as_they_come,
+    indicated,
+    indicators_of,
+    numbered_note,
+)
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError, quoted
 

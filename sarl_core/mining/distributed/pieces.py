@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
@@ -152,6 +153,32 @@ def pieces_of(paths: Sequence[Path]) -> list[Piece]:
     return pieces
 
 
+@contextmanager
+def opened_file(path: str) -> Iterator[Any]:
+    """A Parquet file that was there when the work began.
+
+    Args:
+        path: Of the file.
+
+    Yields:
+        A ``pyarrow.parquet.ParquetFile`` that gives texts by their dictionary.
+
+    Raises:
+        InputError: If it is gone, or damaged.
+    """
+    import pyarrow.parquet as pq
+
+    try:
+        with refusing_damage(), pq.ParquetFile(path) as file:
+            texts = [field.name for field in file.schema_arrow if is_text(field.type)]
+        with refusing_damage(), pq.ParquetFile(path, read_dictionary=texts) as file:
+            yield file
+    except InputError as error:
+        if Path(path).is_file():
+            raise
+        raise InputError("it is gone since the work began; put it back, and begin anew") from error
+
+
 def read_piece(piece: Piece, reading: Reading) -> Demonstrations:
     """Read a piece.
 
@@ -165,21 +192,10 @@ def read_piece(piece: Piece, reading: Reading) -> Demonstrations:
     Raises:
         InputError: If it cannot be read, or holds something wrong; it names the file.
     """
-    import pyarrow.parquet as pq
-
     with naming(piece.name):
-        try:
-            with refusing_damage(), pq.ParquetFile(piece.path) as file:
-                texts = [field.name for field in file.schema_arrow if is_text(field.type)]
-            with refusing_damage(), pq.ParquetFile(piece.path, read_dictionary=texts) as file:
-                groups = list(range(piece.first, piece.first + piece.groups))
-                table = file.read_row_groups(groups, use_threads=False)
-        except InputError as error:
-            if Path(piece.path).is_file():
-                raise
-            raise InputError("it is gone since the work began; put it back, and begin anew") from (
-                error
-            )
+        with opened_file(piece.path) as file:
+            groups = list(range(piece.first, piece.first + piece.groups))
+            table = file.read_row_groups(groups, use_threads=False)
         recording = recording_from_table(arrow_table(table), reading.columns, reading.description)
         named = _name_column(recording.columns, table.schema)
         if named:

@@ -17,6 +17,7 @@ from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
 from sarl_core.demonstrations.formats.sets.file_set import FileSet
+from sarl_core.demonstrations.words import counted_as_they_come
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import require_memory
 
@@ -69,26 +70,29 @@ class TableSet:
         Raises:
             InputError: As of a single table, with the name of the file.
         """
-        own = columns if self.marks is None else _without_episode(columns)
+        needed = columns if self.marks is None else _without_episode(columns)
         parts: list[dict[str, TableColumn]] = []
         begins: list[NDArray[np.bool_]] = []
         size = self.size
         for file, table in zip(self.files, self.tables, strict=True):
             with naming(file):
-                read = table.read(own if own.used else ColumnMap((), table.names[:1]))
+                read = table.read(needed if needed.used else ColumnMap((), table.names[:1]))
                 parts.append(read)
                 size += sum(column.values.nbytes for column in read.values())
                 require_memory(size)
                 n = len(next(iter(read.values())).values)
                 marked = table.read(ColumnMap((), tuple((self.marks or {}).values())))
                 begins.append(_begins(n, self.marks or {}, marked))
-        joined = {name: _joined([part[name] for part in parts]) for name in own.used}
+        joined = {name: _joined([part[name] for part in parts]) for name in needed.used}
         if self.marks is not None and _EPISODE in columns.used:
             joined[_EPISODE] = TableColumn(np.cumsum(np.concatenate(begins)) - 1)
         elif columns.episode is not None:
             column = joined[columns.episode]
-            numbers = renumbered(column.values, list(map(len, begins)))
-            joined[columns.episode] = replace(column, values=numbers)
+            # Words that stand together are one episode, in whatever order they would be sorted.
+            own = counted_as_they_come(column.values) if column.words else column.values
+            numbers = renumbered(own, list(map(len, begins)))
+            if numbers is not own:
+                joined[columns.episode] = TableColumn(numbers, column.missing)
         return {name: joined[name] for name in columns.used}
 
 
