@@ -1,6 +1,8 @@
 # The public names, each with its home: what is loaded when, and what type checkers see.
 from .auditing.audit import Audit as Audit
 from .auditing.audit import audit as audit
+from .auditing.distributed import audit_files as audit_files
+from .auditing.numbers import AuditNumbers as AuditNumbers
 from .demonstrations.dataset import Demonstrations as Demonstrations
 from .demonstrations.dataset import with_formulas as with_formulas
 from .demonstrations.formats import load_demonstrations as load_demonstrations

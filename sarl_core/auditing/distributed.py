@@ -16,7 +16,7 @@ from sarl_core.auditing.counts import LogCounts, counts_of, together
 from sarl_core.auditing.matching import matched_log, matched_states
 from sarl_core.auditing.numbers import AuditNumbers
 from sarl_core.auditing.parts import (
-    Part,
+    LogPart,
     episode_column,
     gaps_note,
     parts_of,
@@ -30,7 +30,7 @@ from sarl_core.clusters import cluster as connected
 from sarl_core.clusters import saying_losses, worked_out
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats.columns import Columns, stated
-from sarl_core.demonstrations.formats.missing import Gaps, Missing, gaps_together
+from sarl_core.demonstrations.formats.missing import Missing, StepGaps, gaps_together
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.errors import InputError, require
 from sarl_core.mining.distributed.pieces import (
@@ -77,7 +77,7 @@ class PartSurvey:
     keys: Keys
     medians: NDArray[np.float64]
     timed: NDArray[np.int64]
-    gaps: Gaps
+    gaps: StepGaps
     is_rewarded: bool
     notes: tuple[str | None, ...]
 
@@ -207,7 +207,7 @@ def audit_on_cluster(
     )
 
 
-def survey_part(part: Part, reading: Reading, share: float) -> PartSurvey:
+def survey_part(part: LogPart, reading: Reading, share: float) -> PartSurvey:
     """Look at a part.
 
     Args:
@@ -261,7 +261,7 @@ def survey_part(part: Part, reading: Reading, share: float) -> PartSurvey:
 
 
 def count_part(
-    part: Part,
+    part: LogPart,
     reading: Reading,
     placement: Placement,
     shield: Shield,
@@ -295,7 +295,7 @@ def count_part(
 
 def _parts(
     client: Any, files: Sequence[Path], reading: Reading, advance: Callable[[float], None]
-) -> list[Part]:
+) -> list[LogPart]:
     """The light pass: the column of the episodes alone."""
     segments = segments_of(pieces_of(files))
     column = client.submit(episode_column, segments[0], reading).result()
@@ -306,7 +306,7 @@ def _parts(
 
 def _surveyed(
     client: Any,
-    parts: Sequence[Part],
+    parts: Sequence[LogPart],
     reading: Reading,
     size: int,
     advance: Callable[[float], None],

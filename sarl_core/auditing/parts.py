@@ -16,22 +16,27 @@ from sarl_core.demonstrations.formats.arrow.parquet_file import is_text
 from sarl_core.demonstrations.formats.arrow.table import arrow_table
 from sarl_core.demonstrations.formats.mapping.roles import ROLE_WORDS
 from sarl_core.demonstrations.formats.metadata import KEY
-from sarl_core.demonstrations.formats.missing import Gaps
+from sarl_core.demonstrations.formats.missing import StepGaps
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.demonstrations.formats.recording import gaps_in, to_demonstrations
 from sarl_core.demonstrations.formats.sets.table_set import one_set_note, renumbered
 from sarl_core.demonstrations.formats.tables import recording_from_table
 from sarl_core.demonstrations.requirements import EXACT, require_order, whole_numbers
-from sarl_core.demonstrations.words import counted_as_they_come, numbered_note
+from sarl_core.demonstrations.words import (
+    counted_as_they_come,
+    numbered_episodes,
+    numbered_note,
+)
 from sarl_core.errors import InputError, quoted
 from sarl_core.limits import READ_LIMIT, read_limit, table_memory
 from sarl_core.mining.distributed import pieces
 from sarl_core.mining.distributed.pieces import Piece, Reading, opened_file
 
 _FEWEST = 2  # steps that are demonstrations
+_SMALL = 8  # so small a share of the rows of a piece is no part: hardly any might be complete
 
 
-class Runs(NamedTuple):
+class EpisodeRuns(NamedTuple):
     """The episodes of some rows, as their column has them.
 
     Attributes:
@@ -64,7 +69,7 @@ class Segment:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class LogPart:
     """Whole episodes, one after the other, in one file or in several.
 
     Attributes:
@@ -97,9 +102,10 @@ class Part:
     @property
     def name(self) -> str:
         """As sentences call it; rows of a part are counted from where it begins."""
-        first = self.segments[0]
+        first, last = self.segments[0], self.segments[-1]
         begins = f", from row {first.first + 1}" if first.first else ""
-        return f"{first.name}{begins}"
+        ends = f", to {last.name}" if last.path != first.path else ""
+        return f"{first.name}{begins}{ends}"
 
 
 class PartRead(NamedTuple):
@@ -113,12 +119,12 @@ class PartRead(NamedTuple):
     """
 
     steps: Demonstrations | None
-    gaps: Gaps
+    gaps: StepGaps
     is_rewarded: bool
     notes: tuple[str | None, ...]
 
 
-def gaps_note(gaps: Gaps, is_rewarded: bool) -> str:
+def gaps_note(gaps: StepGaps, is_rewarded: bool) -> str:
     """What is said of steps that were left out, of a part or of a whole log."""
     return gaps.note + ", and returns lack their rewards" * is_rewarded
 
@@ -154,8 +160,8 @@ def episode_column(segment: Segment, reading: Reading) -> str:
     Raises:
         InputError: If there is none, or it is a part of another one.
     """
+    table = _rows_of(segment)
     with naming(segment.name):
-        table = _rows_of(segment)
         read = recording_from_table(arrow_table(table), reading.columns, reading.description)
         used = [one.column for one in read.columns if one.use == ROLE_WORDS["episode"]]
         column = used[0] if used else ""
@@ -172,7 +178,7 @@ def episode_column(segment: Segment, reading: Reading) -> str:
         return column
 
 
-def runs_of(segment: Segment, column: str) -> Runs:
+def runs_of(segment: Segment, column: str) -> EpisodeRuns:
     """The episodes of some rows, by one of their columns alone.
 
     Args:
@@ -188,8 +194,8 @@ def runs_of(segment: Segment, column: str) -> Runs:
     import pyarrow as pa
     import pyarrow.compute as pc
 
+    held = _rows_of(segment, [column]).column(0)
     with naming(segment.name):
-        held = _rows_of(segment, [column]).column(0)
         if held.null_count:
             row = segment.first + int(pc.index(pc.is_null(held), True).as_py())
             raise InputError(
@@ -200,7 +206,7 @@ def runs_of(segment: Segment, column: str) -> Runs:
             codes = np.concatenate([chunk.indices.to_numpy() for chunk in texts.chunks])
             words = np.array(texts.chunk(0).dictionary.to_pylist(), dtype=np.object_)
             starts = _starts(codes)
-            return Runs(words[codes[starts]], np.diff(np.append(starts, len(codes))))
+            return EpisodeRuns(words[codes[starts]], np.diff(np.append(starts, len(codes))))
         if pa.types.is_decimal(held.type):
             held = pc.cast(held, pa.float64())
         values = held.to_numpy()
@@ -210,12 +216,12 @@ def runs_of(segment: Segment, column: str) -> Runs:
                 "the episodes, or give them names"
             )
         starts = _starts(values)
-        return Runs(values[starts], np.diff(np.append(starts, len(values))))
+        return EpisodeRuns(values[starts], np.diff(np.append(starts, len(values))))
 
 
 def parts_of(
-    segments: Sequence[Segment], runs: Sequence[Runs], column: str, files: Sequence[Path]
-) -> list[Part]:
+    segments: Sequence[Segment], runs: Sequence[EpisodeRuns], column: str, files: Sequence[Path]
+) -> list[LogPart]:
     """Cut files into parts of whole episodes, each with about the rows of a piece.
 
     Args:
@@ -244,7 +250,7 @@ def parts_of(
     cuts = _cuts(np.searchsorted(rows, _bounds(segments)).tolist(), ends)
     notes = (one_set_note([path.as_posix() for path in files]),) if len(files) > 1 else ()
     return [
-        Part(
+        LogPart(
             segments=_within(segments, int(ends[begin]), int(ends[end])),
             described=described,
             column=column,
@@ -259,7 +265,7 @@ def parts_of(
     ]
 
 
-def read_part(part: Part, reading: Reading) -> PartRead:
+def read_part(part: LogPart, reading: Reading) -> PartRead:
     """Read a part.
 
     Args:
@@ -274,8 +280,10 @@ def read_part(part: Part, reading: Reading) -> PartRead:
     """
     import pyarrow as pa
 
+    tables = [_rows_of(segment) for segment in part.segments]
     with naming(part.name):
-        table = _joined([_rows_of(segment) for segment in part.segments])
+        table = _joined(tables)
+        del tables
         said = None if part.described is None else {KEY: part.described}
         table = table.replace_schema_metadata(said)
         numbers = np.repeat(part.episodes, part.lengths)
@@ -301,7 +309,7 @@ def read_part(part: Part, reading: Reading) -> PartRead:
 
 def _rows_of(segment: Segment, columns: list[str] | None = None) -> Any:
     """Rows of a file as a ``pyarrow.Table``, by the row groups that hold them."""
-    with opened_file(segment.path) as file:
+    with naming(segment.name), opened_file(segment.path) as file:
         about = file.metadata
         sizes = [about.row_group(group).num_rows for group in range(about.num_row_groups)]
         ends = np.cumsum(sizes)
@@ -335,7 +343,7 @@ def _joined(tables: Sequence[Any]) -> Any:
     return pa.concat_tables([plain(table) for table in tables], promote_options="permissive")
 
 
-def _notes(part: Part, notes: tuple[str, ...]) -> tuple[str, ...]:
+def _notes(part: LogPart, notes: tuple[str, ...]) -> tuple[str, ...]:
     """The notes of a part, with those on all files in the first part alone."""
     if part.is_named:
         notes = tuple(note for note in notes if part.is_first or note != part.numbering)
@@ -351,7 +359,7 @@ def _starts(values: NDArray[Any]) -> NDArray[np.int64]:
 
 
 def _numbered(
-    segments: Sequence[Segment], runs: Sequence[Runs], column: str, rows: NDArray[np.int64]
+    segments: Sequence[Segment], runs: Sequence[EpisodeRuns], column: str, rows: NDArray[np.int64]
 ) -> tuple[NDArray[np.int64], bool, Callable[[int], str]]:
     """The numbers of the episodes of runs, as reading at once gives them.
 
@@ -370,8 +378,8 @@ def _numbered(
     if numbers.dtype.kind in "iu" and not (
         -EXACT <= int(numbers.min()) <= int(numbers.max()) <= EXACT
     ):
-        note = numbered_note(called, str(numbers[0]))
-        return counted_as_they_come(numbers), False, lambda _: note
+        counted, note = numbered_episodes(numbers, called, str(numbers[0]))
+        return counted, False, lambda _: note
     return whole_numbers(numbers, len(numbers), called, rows), False, lambda _: ""
 
 
@@ -408,11 +416,11 @@ def _bounds(segments: Sequence[Segment]) -> list[int]:
 
 
 def _cuts(cuts: Sequence[int], ends: NDArray[np.int64]) -> list[int]:
-    """Places of episodes at which parts begin, and the end; none has less than two rows."""
+    """Places of episodes at which parts begin, and the end; a small rest goes with those before."""
     last = len(ends) - 1
     enough = [0]
     for cut in (*cuts, last):
-        if ends[cut] - ends[enough[-1]] >= _FEWEST:
+        if ends[cut] - ends[enough[-1]] >= max(pieces.ROWS // _SMALL, _FEWEST):
             enough.append(cut)
     if enough[-1] != last:
         enough[max(len(enough) - 1, 1) :] = [last]

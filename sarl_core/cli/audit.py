@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,6 +15,7 @@ import typer
 from sarl_core.cli import terminal
 from sarl_core.cli.inputs import path_of, read_demonstrations, sign_off_of
 from sarl_core.cli.options import (
+    ClusterAddress,
     Columns,
     Json,
     MissingName,
@@ -29,9 +31,14 @@ if TYPE_CHECKING:
     from sarl_core.auditing.comparison import LogComparison
     from sarl_core.auditing.growing import GrowingLog
     from sarl_core.auditing.guards import GuardCondition
+    from sarl_core.auditing.numbers import AuditNumbers
     from sarl_core.demonstrations.dataset import Demonstrations
     from sarl_core.demonstrations.formats.mapping.roles import Roles
+    from sarl_core.demonstrations.formats.missing import Missing
     from sarl_core.explaining.words.sign_off import SignOff
+    from sarl_core.mining.rule_set import RuleSet
+    from sarl_core.progress import Progress
+    from sarl_core.shielding.projection import Projection
 
 _FAILED = 3  # a condition of --fail-on holds
 _LISTED = 12
@@ -49,7 +56,7 @@ def audit(
         typer.Argument(
             metavar="LOG...",
             help="What somebody did: demonstrations in any format that is read; several files are "
-            "one log.",
+            "one log. With --cluster Parquet files, folders of them, or patterns.",
             show_default=False,
         ),
     ],
@@ -59,7 +66,7 @@ def audit(
         Path | None,
         out_option(
             "Write audit.json, audit.html, steps.csv, rules.csv and episodes.csv into this "
-            "folder; made if it is not there.",
+            "folder; made if it is not there. With --cluster no steps.csv.",
             metavar="DIR",
         ),
     ] = None,
@@ -102,6 +109,7 @@ def audit(
             "whenever it has; Ctrl-C ends with the answer.",
         ),
     ] = False,
+    cluster: ClusterAddress = None,
     as_json: Json = False,
 ) -> None:
     """Hold rules against a log: where they were broken, how often, and whether it drifts.
@@ -112,7 +120,14 @@ def audit(
     Example: `python -m sarl_core audit data/rules/cartpole_compact.json
     data/demonstrations/cartpole.parquet --fail-on "breaks>0.02" --out audited`
     """
-    with terminal.working("Auditing"):
+    if follow and cluster is not None:
+        raise InputError(
+            "--follow reads lines of text while they are written, and a cluster reads Parquet "
+            "files; leave one of the two out"
+        )
+    if out is not None:
+        terminal.check_folder(out)
+    with terminal.working("Auditing") as advance:
         from sarl_core.auditing.audit import audit as against
         from sarl_core.auditing.comparison import LogComparison
         from sarl_core.auditing.guards import guard
@@ -131,28 +146,40 @@ def audit(
         )
 
         def hold(path: Path | list[Path], steps: Demonstrations | None = None) -> Audit:
-            try:
+            with _naming(path):
                 return against(
                     rule_set,
                     read_demonstrations(path, None, columns, missing) if steps is None else steps,
                     projection=projection,
                     demonstrations=mined_from,
                 )
-            except InputError as error:
-                name = path_of(path if isinstance(path, list) else [path])
-                raise InputError(_with_path(error, name)) from error
 
+        held: AuditNumbers
+        after: AuditNumbers | None
         stopped: InputError | None = None
-        if follow:
+        if cluster is not None:
+            held, after = _held_on_cluster(
+                rule_set,
+                [logs, *([] if compare is None else [[compare]])],
+                cluster,
+                columns,
+                missing,
+                projection,
+                mined_from,
+                advance,
+            )
+        elif follow:
             from sarl_core.auditing.growing import GrowingLog
 
             if len(logs) > 1:
                 raise InputError("--follow follows one log as it grows; give one file")
             growing = GrowingLog(logs[0], columns, missing)
             held, stopped = _followed(growing, partial(hold, logs[0]), guards)
+            after = None if compare is None else hold(compare)
         else:
             held = hold(logs)
-        comparison = None if compare is None else LogComparison(held, hold(compare))
+            after = None if compare is None else hold(compare)
+        comparison = None if after is None else LogComparison(held, after)
         if out is not None:
             from sarl_core.explaining.exports.audit import save_audit
 
@@ -171,10 +198,62 @@ def audit(
     else:
         _print(held, comparison, f"{path_of(logs)} against {called(rules)}", sign_off)
         if out is not None:
-            terminal.print_lines([f"Wrote {out}."])
+            without = (
+                "" if cluster is None else " It has no steps.csv: the steps stay in the files."
+            )
+            terminal.print_lines([f"Wrote {out}.{without}"])
     if stopped is not None:
         raise stopped
     _guard(held, guards)
+
+
+@contextmanager
+def _naming(path: Path | list[Path]) -> Iterator[None]:
+    """Let an error inside name the log that it is about."""
+    try:
+        yield
+    except InputError as error:
+        name = path_of(path if isinstance(path, list) else [path])
+        raise InputError(_with_path(error, name)) from error
+
+
+def _held_on_cluster(
+    rule_set: RuleSet,
+    logs: list[list[Path]],
+    cluster: str,
+    columns: Roles,
+    missing: Missing,
+    projection: Projection,
+    demonstrations: Demonstrations | None,
+    advance: Progress,
+) -> tuple[AuditNumbers, AuditNumbers | None]:
+    """Audit one log or two in Parquet files, on one cluster."""
+    from sarl_core.auditing.distributed import audit_on_cluster
+    from sarl_core.auditing.reference import reference_of
+    from sarl_core.clusters import cluster as connected
+    from sarl_core.demonstrations.formats.columns import stated
+    from sarl_core.mining.distributed.pieces import Reading, parquet_paths
+    from sarl_core.shielding.shield import Shield
+
+    files = []
+    for paths in logs:
+        with _naming(paths):
+            files.append(parquet_paths(paths))
+    shield = Shield(rule_set, projection=projection)
+    reference = None if demonstrations is None else reference_of(shield, demonstrations)
+    reading = Reading(stated(columns), missing=missing)
+    held: list[AuditNumbers] = []
+    with connected(cluster) as client:
+        for place, (paths, own) in enumerate(zip(logs, files, strict=True)):
+
+            def progress(done: int, total: int, place: int = place) -> bool | None:
+                return advance(place * total + done, len(logs) * total)
+
+            with _naming(paths):
+                held.append(
+                    audit_on_cluster(client, shield, own, reading, reference, progress=progress)
+                )
+    return held[0], held[1] if len(held) > 1 else None
 
 
 def _said_of(demonstrations: Path, columns: Roles) -> Roles:
@@ -223,7 +302,7 @@ def _with_path(error: InputError, path: str) -> str:
     return text if path in text else f"{path}: {text}"
 
 
-def _guard(held: Audit, guards: list[GuardCondition]) -> None:
+def _guard(held: AuditNumbers, guards: list[GuardCondition]) -> None:
     """End with a code of its own where a condition holds."""
     failed = [one for one in guards if one.holds(held)]
     terminal.print_notes(
@@ -237,7 +316,7 @@ def _guard(held: Audit, guards: list[GuardCondition]) -> None:
 
 
 def _print(
-    held: Audit, comparison: LogComparison | None, title: str, sign_off: SignOff | None
+    held: AuditNumbers, comparison: LogComparison | None, title: str, sign_off: SignOff | None
 ) -> None:
     from sarl_core.cli.answers.summaries import print_notes
     from sarl_core.explaining.words.audit import (

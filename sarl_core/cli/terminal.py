@@ -231,6 +231,24 @@ def check_output(path: Path, suffixes: Sequence[str]) -> None:
         raise InputError(f"the folder {path.parent} cannot be written to; choose another")
 
 
+def check_folder(path: Path) -> None:
+    """Refuse a folder that cannot be made, before any work is done for it.
+
+    Args:
+        path: The folder that is to be there.
+
+    Raises:
+        InputError: If it is a file, or the folder above it does not exist.
+    """
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{path} is a file; give a folder")
+    if not path.parent.is_dir():
+        raise InputError(
+            f"the folder {path} cannot be made: {path.parent} does not exist; make it or choose "
+            "another"
+        )
+
+
 def _console(*, error: bool = False) -> Console:
     from rich.console import Console
 

@@ -104,6 +104,22 @@ def counted_as_they_come(values: NDArray[Any]) -> NDArray[np.int64]:
     return np.argsort(np.argsort(first))[places.reshape(-1)]
 
 
+def numbered_episodes(
+    values: NDArray[Any], column: str, first: str
+) -> tuple[NDArray[np.int64], str]:
+    """Episodes that are numbered as they come.
+
+    Args:
+        values: What their column has, (N,).
+        column: As of `numbered_note`.
+        first: Likewise.
+
+    Returns:
+        Their numbers, (N,), and the note.
+    """
+    return counted_as_they_come(values), numbered_note(column, first)
+
+
 def numbered_note(column: str, first: str) -> str:
     """That episodes got other numbers than their column has.
 

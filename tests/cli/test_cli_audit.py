@@ -2,9 +2,11 @@
 
 import csv
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from sarl_core import load_demonstrations
@@ -169,3 +171,69 @@ def test_a_column_of_another_name_is_a_feature_of_the_rules(
     assert json.loads(capsys.readouterr().out)["steps"] == len(log)
     # What was said is of the log: what the rules were mined from has columns of its own.
     assert main([*command, "--demonstrations", LOG]) == 0
+
+
+# --- on a cluster --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """The log in three files, cut anywhere."""
+    table = pq.read_table(LOG)
+    (tmp_path / "logs").mkdir()
+    for number, (first, end) in enumerate(pairwise((0, 4_321, 4_400, 15_000))):
+        path = tmp_path / "logs" / f"part-{number}.parquet"
+        pq.write_table(table.slice(first, end - first), path, row_group_size=2_000)
+    return tmp_path / "logs"
+
+
+def test_a_cluster_gives_the_document_of_one_memory(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    more = ["--demonstrations", LOG, "--compare", str(folder), "--fail-on", "coverage>50%"]
+    documents = []
+    for place, cluster in enumerate(([], ["--cluster", "local:2"])):
+        out = tmp_path / f"audited-{place}"
+        command = ["audit", RULES, str(folder), *more, *cluster]
+        assert main([*command, "--out", str(out), "--json"]) == 3
+        documents.append(capsys.readouterr().out)
+    assert documents[0] == documents[1]
+    whole, far = (tmp_path / f"audited-{place}" for place in range(2))
+    assert {path.name for path in whole.iterdir()} - {path.name for path in far.iterdir()} == {
+        "steps.csv"
+    }
+    for path in far.iterdir():
+        assert path.read_bytes() == (whole / path.name).read_bytes()
+
+
+def test_a_cluster_says_what_it_does_not_write(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pattern = str(folder / "*.parquet")
+    out = tmp_path / "audited"
+    assert main(["audit", RULES, pattern, "--cluster", "local:1", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "It has no steps.csv: the steps stay in the files." in said
+    assert "15,000 in 30 episodes" in said
+
+
+@pytest.mark.parametrize(
+    ("log", "arguments", "said"),
+    [
+        (LOG, ["--follow"], "--follow reads lines of text while they are written"),
+        (LOG, ["--out", "no/such/folder"], "the folder no/such/folder cannot be made: no/such"),
+        (LOG, ["--out", LOG], "cartpole.parquet is a file; give a folder"),
+        ("data/rules", [], "data/rules: this folder holds no Parquet file; give one that does"),
+        ("no/*.parquet", [], "no/*.parquet: no file has a name of this pattern"),
+        (LOG, ["--compare", "data/rules"], "data/rules: this folder holds no Parquet file"),
+        ("data/demonstrations/pendulum.parquet", [], "pendulum.parquet: the rules ask about 4"),
+    ],
+)
+def test_what_a_cluster_cannot_do_is_one_sentence(
+    log: str, arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["audit", RULES, log, "--cluster", "local:1", *arguments]) == 2
+    out, error = capsys.readouterr()
+    assert out == ""
+    assert error.count("\n") == 1
+    assert said in error

@@ -17,7 +17,7 @@ Holes = Mapping[str, NDArray[np.bool_]]
 _LISTED = 4  # columns in a sentence
 
 
-class Gaps(NamedTuple):
+class StepGaps(NamedTuple):
     """How many of N steps lack something.
 
     Attributes:
@@ -56,7 +56,7 @@ class Gaps(NamedTuple):
         )
 
 
-def gaps_of(holes: Holes, infinite: Holes, rows: int) -> Gaps:
+def gaps_of(holes: Holes, infinite: Holes, rows: int) -> StepGaps:
     """Count steps that lack something.
 
     Args:
@@ -70,7 +70,7 @@ def gaps_of(holes: Holes, infinite: Holes, rows: int) -> Gaps:
     lacking = np.zeros(rows, dtype=np.bool_)
     for hole in (*holes.values(), *infinite.values()):
         lacking |= hole
-    return Gaps(
+    return StepGaps(
         rows,
         int(np.count_nonzero(lacking)),
         *(
@@ -80,14 +80,14 @@ def gaps_of(holes: Holes, infinite: Holes, rows: int) -> Gaps:
     )
 
 
-def gaps_together(parts: Sequence[Gaps]) -> Gaps:
+def gaps_together(parts: Sequence[StepGaps]) -> StepGaps:
     """The gaps of parts of a table as those of the whole."""
 
     def joined(columns: Sequence[Mapping[str, int]]) -> Mapping[str, int]:
         names = dict.fromkeys(name for one in columns for name in one)
         return {name: sum(one.get(name, 0) for one in columns) for name in names}
 
-    return Gaps(
+    return StepGaps(
         sum(part.rows for part in parts),
         sum(part.lacking for part in parts),
         joined([part.empty for part in parts]),

@@ -15,9 +15,9 @@ from sarl_core.demonstrations.fields import ColumnUse, Indicator
 from sarl_core.demonstrations.formats.columns import only_counted
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.missing import (
-    Gaps,
     Holes,
     Missing,
+    StepGaps,
     complete_rows,
     gaps_of,
 )
@@ -39,7 +39,7 @@ from sarl_core.demonstrations.requirements import (
     whole_numbers_note,
     without_fraction,
 )
-from sarl_core.demonstrations.words import by_name, counted_as_they_come, numbered_note
+from sarl_core.demonstrations.words import by_name, numbered_episodes
 from sarl_core.environments.description import EnvironmentDescription, describe_environment
 from sarl_core.environments.feature_order import NamedFeatures, line_up, numbered, only_counts
 from sarl_core.errors import InputError, quoted
@@ -296,13 +296,11 @@ def _with_short_numbers(recording: Recording) -> Recording:
         return recording
     if not episodes.size or -EXACT <= int(episodes.min()) <= int(episodes.max()) <= EXACT:
         return recording
-    note = numbered_note(_called(recording, "episode"), str(episodes[0]))
-    return replace(
-        recording, episodes=counted_as_they_come(episodes), notes=(*recording.notes, note)
-    )
+    numbers, note = numbered_episodes(episodes, _called(recording, "episode"), str(episodes[0]))
+    return replace(recording, episodes=numbers, notes=(*recording.notes, note))
 
 
-def gaps_in(recording: Recording, missing: Missing) -> Gaps:
+def gaps_in(recording: Recording, missing: Missing) -> StepGaps:
     """How many steps of a table lack one of their values, before it is completed.
 
     Args:

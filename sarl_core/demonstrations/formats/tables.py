@@ -37,13 +37,7 @@ from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.times import as_clock, of_words, with_seconds
 from sarl_core.demonstrations.formats.units import without_units
 from sarl_core.demonstrations.requirements import coarse_columns, crowded, flags
-from sarl_core.demonstrations.words import (
-    Coded,
-    counted_as_they_come,
-    indicated,
-    indicators_of,
-    numbered_note,
-)
+from sarl_core.demonstrations.words import Coded, indicated, indicators_of, numbered_episodes
 from sarl_core.environments.description import EnvironmentDescription
 from sarl_core.errors import InputError, quoted
 
@@ -200,8 +194,8 @@ def without_times(
     if episode is None or not left[episode].words:
         return guess, left, ()
     codes, words = left[episode].values, left[episode].words
-    left[episode] = TableColumn(counted_as_they_come(codes), left[episode].missing)
-    note = numbered_note(f"column {episode!r}", repr(words[codes[0]]))
+    numbers, note = numbered_episodes(codes, f"column {episode!r}", repr(words[codes[0]]))
+    left[episode] = TableColumn(numbers, left[episode].missing)
     return guess, left, (note,)
 
 
