@@ -21,6 +21,7 @@ from sarl_core import (
     audit_files,
     load_demonstrations,
     load_rules,
+    mine_never_rules,
     save_demonstrations,
 )
 from sarl_core.auditing import near
@@ -172,7 +173,7 @@ FAULTS = {
     ),
     "a label that the rules do not know": (
         lambda table: table.assign(action=table.action.replace("go", "swerve")),
-        r"log-0.parquet, from row \d+, to log-1.parquet: the log holds the 'action' 'swerve'",
+        r"log-1.parquet.*: the log holds the 'action' 'swerve' in row",
     ),
     "a word that the rules do not know": (
         lambda table: table.assign(obs_road=table.obs_road.replace("wet", "flooded")),
@@ -207,3 +208,13 @@ def test_logs_without_a_step(
     loose = fleet.drop(columns="episode")
     with pytest.raises(InputError, match="no column says to which episode a row belongs"):
         held_far(client, fleet_rules, in_files(loose, tmp_path / "loose", [2_000]))
+
+
+def test_rules_that_forbid_are_refused_before_anything_is_read(client: Any) -> None:
+    whole = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
+    rules = mine_never_rules(whole, epsilon=0.3, supp_min=0.02)
+    assert rules.forbids
+    with pytest.raises(InputError, match="the audit understands rules that demand an action"):
+        audit_files(rules, "no/such/folder", "local:2")
+    with pytest.raises(InputError, match="the audit understands rules that demand an action"):
+        audit_on_cluster(client, Shield(rules), [Path("no/such/file")], Reading())
