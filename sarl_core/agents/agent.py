@@ -70,6 +70,19 @@ class EpisodicAgent(Agent, Protocol):
         """
 
 
+@runtime_checkable
+class PlacedAgent(Agent, Protocol):
+    """One that does what it does by where in its episode it is, and so has to be told."""
+
+    def place(self, episodes: NDArray[np.int64], steps: NDArray[np.int64]) -> None:
+        """Say where the states lie that it is asked about next.
+
+        Args:
+            episodes: Index of the episode of each, (B,).
+            steps: Steps of the episode so far, (B,).
+        """
+
+
 @dataclass(frozen=True, eq=False)
 class PolicyAgent:
     """A trained (or an untrained) network.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent, EpisodicAgent, order_notes
+from sarl_core.agents.agent import Agent, EpisodicAgent, PlacedAgent, order_notes
 from sarl_core.agents.own import AgentFaultError
 from sarl_core.agents.spaces import Actions, SpaceAdapter, adapt
 from sarl_core.environments.description import describe_environment, make_environment
@@ -215,6 +215,8 @@ class _Lanes:
         """Step every lane once, and give the number of episodes that ended."""
         states, adapter = self.states, self.adapter
         episodes = np.array([lane.episode for lane in self.lanes])
+        if isinstance(self.agent, PlacedAgent):
+            self.agent.place(episodes, self.lengths[episodes])
         choice = choose(
             self.agent, self.shield, adapter, states, [lane.generator for lane in self.lanes]
         )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Self, cast
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,7 +113,7 @@ class _Probe(NamedTuple):
 
 
 class _Prober:
-    """Plays an episode again, and does something else from a step on.
+    """Plays episodes again, and does something else from a step on.
 
     Attributes:
         name: Of the expert.
@@ -124,33 +124,36 @@ class _Prober:
 
     def __init__(self, expert: Agent, table: StepTable, probes: Sequence[_Probe]) -> None:
         self.name, self._expert, self._table = expert.name, expert, table
-        self._waiting = iter(probes)
+        columns = zip(*probes, strict=True)
+        self._row, self._dimension, self._value, self._long = map(np.array, columns)
 
-    def begin_episode(self, seed: int) -> None:
-        self._probe, self._step = next(self._waiting), 0
-        if isinstance(self._expert, EpisodicAgent):
-            self._expert.begin_episode(seed)
+    def place(self, episodes: NDArray[np.int64], steps: NDArray[np.int64]) -> None:
+        self._episodes, self._steps = episodes, steps
 
     def act(
         self, observations: NDArray[np.float32], uniforms: NDArray[np.float64] | None
     ) -> Actions:
-        step, probe = self._step, self._probe
-        self._step += 1
-        again = step < probe.row
-        if again and not np.array_equal(observations[0], self._table.observation[step]):
+        episodes, steps = self._episodes, self._steps
+        again = steps < self._row[episodes]
+        before = steps[again]
+        if not np.array_equal(observations[again], self._table.observation[before]):
             raise InputError(
                 "the environment does not repeat itself: played again from the same seed with the "
-                f"same actions, step {step} has another state; probe one that does"
+                "same actions it comes to other states; probe one that does"
             )
-        if again and not isinstance(self._expert, EpisodicAgent):
-            return cast(Actions, self._table.executed[step][None])
-        action = self._expert.act(observations, None)
-        if again:
-            return cast(Actions, self._table.executed[step][None])
-        if step < probe.row + probe.steps:
-            action = action.copy()
-            action[0, probe.dimension] = probe.value
-        return action
+        actions = self._expert.act(observations, None).copy()
+        trying = ~again & (steps < (self._row + self._long)[episodes])
+        actions[trying, self._dimension[episodes[trying]]] = self._value[episodes[trying]]
+        actions[again] = self._table.executed[before]
+        return actions
+
+
+class _RememberingProber(_Prober):
+    """The same with an expert that has to see its episodes from their start."""
+
+    def begin_episode(self, seed: int) -> None:
+        assert isinstance(self._expert, EpisodicAgent)
+        self._expert.begin_episode(seed)
 
 
 def probed(
@@ -196,9 +199,10 @@ def probed(
         """Which failed, and which were cut short."""
         if not probes:
             return np.zeros(0, dtype=np.bool_), np.zeros(0, dtype=np.bool_)
+        remembers = isinstance(expert, EpisodicAgent)
         episodes = run_seeds(
             env_id,
-            _Prober(expert, table, probes),
+            (_RememberingProber if remembers else _Prober)(expert, table, probes),
             None,
             np.full(len(probes), seed, dtype=np.int64),
             keep_steps=False,
