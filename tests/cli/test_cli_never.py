@@ -1,0 +1,130 @@
+"""Rules that forbid, on the command line: mined, held by a shield, and made of probes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from sarl_core import RuleSet
+from sarl_core.cli.app import main
+
+LANDER = "data/demonstrations/lunar_lander.parquet"
+CART = "data/demonstrations/cartpole.parquet"
+
+
+@pytest.fixture
+def typed(capsys):
+    """Run a command line, and give its code and what it printed."""
+
+    def call(*arguments: str) -> tuple[int, str, str]:
+        code = main(list(arguments))
+        printed = capsys.readouterr()
+        return code, printed.out, printed.err
+
+    return call
+
+
+def test_rules_that_forbid_alone(typed, tmp_path):
+    out = tmp_path / "never.json"
+    code, told, _ = typed("mine", LANDER, "--never", "0.1", "--support", "0.002", "--out", str(out))
+    assert code == 0
+    rules = RuleSet.load(out)
+    assert len(rules) == 52
+    assert all(rule.forbids for rule in rules)
+    assert "of the choice is left there" in told
+    assert "then never do nothing: the expert did not in 97.5 % of 9,682 states." in told
+
+
+def test_rules_that_forbid_behind_rules_that_demand(typed, tmp_path):
+    out = tmp_path / "both.json"
+    arguments = ("--setting", "filtered", "--never", "0.1", "--out", str(out), "--json")
+    code, told, _ = typed("mine", CART, *arguments)
+    assert code == 0
+    document = json.loads(told)
+    kinds = [rule.kind for rule in RuleSet.load(out)]
+    assert kinds == sorted(kinds)
+    assert {*kinds} == {"do", "never"}
+    assert document["thresholds"]["never"] == 0.1
+    assert 0 < document["freedom"] < 1
+    assert 0 < document["coverage"] <= 1
+
+
+def test_what_is_left_to_an_agent_is_told(typed, tmp_path):
+    out = tmp_path / "never.json"
+    assert typed("mine", LANDER, "--never", "0.1", "--support", "0.01", "--out", str(out))[0] == 0
+    arguments = ("--env", "LunarLander-v3", "--agent", "novice", "--rules", str(out), "--json")
+    code, told, _ = typed("evaluate", *arguments, "--episodes", "5", "--seed", "3")
+    assert code == 0
+    assert 0.2 < json.loads(told)["summary"]["freedom"] < 0.8
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--never", "0"), "above 0 and below 1"),
+        (("--never", "1"), "above 0 and below 1"),
+        (("--never", "0.1", "--confidence", "0.9"), "give both --support and --confidence"),
+        (("--never", "0.1", "--hold-out", "0.2"), "--hold-out is for rules that demand"),
+        (("--never", "0.1", "--cross-fit"), "--cross-fit is for rules that demand"),
+        (("--never", "0.1", "--cluster", "local:2"), "--cluster, or a .mined file, is for rules"),
+    ],
+)
+def test_what_cannot_be_mined_is_one_sentence(typed, tmp_path, options, said):
+    out = tmp_path / "never.json"
+    code, told, error = typed("mine", CART, *options, "--out", str(out))
+    assert (code, told) == (2, "")
+    assert said in error
+    assert error.count("\n") == 1
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("command", ["report", "diff", "ablate"])
+def test_where_they_are_not_understood_that_is_said(typed, tmp_path, command):
+    out = tmp_path / "never.json"
+    assert typed("mine", CART, "--never", "0.1", "--out", str(out))[0] == 0
+    arguments = {
+        "report": (str(out), "--demonstrations", CART, "--out", str(tmp_path / "report.html")),
+        "diff": (str(out), str(out)),
+        "ablate": ("--env", "CartPole-v1", "--agent", "novice", "--rules", str(out)),
+    }[command]
+    code, _, error = typed(command, *arguments)
+    assert code == 2
+    assert "some of these forbid one" in error
+
+
+def test_probes_leave_rules_and_a_card(typed, tmp_path):
+    out = tmp_path / "never.json"
+    options = ("--rounds", "2", "--episodes", "12", "--validation", "10", "--report-episodes", "10")
+    arguments = ("probe", "--env", "CartPole-v1", *options, "--seed", "3", "--out", str(out))
+    code, told, _ = typed(*arguments)
+    assert code == 0
+    assert f"Wrote {out}: " in told
+    card = json.loads(Path(out).with_suffix(".card.json").read_text())
+    assert card["command"].startswith("python -m sarl_core probe --env CartPole-v1 --out ")
+    assert [one["number"] for one in card["rounds"]] == [1, 2]
+    assert card["reported"]["episodes"] == 10
+    rules = RuleSet.load(out)
+    assert len(rules) == card["rules"]
+    assert all(rule.origin == "probed" for rule in rules)
+    assert json.loads(typed(*arguments, "--json")[1])["reported"] == card["reported"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--env", "Pendulum-v1"), "--failure"),
+        (("--env", "CartPole-v1", "--risk", "0"), "the risk is 0.0"),
+        (("--env", "CartPole-v1", "--risk", "1.5"), "the risk is 1.5"),
+        (("--env", "CartPole-v1", "--leaves", "1"), "leaves"),
+        (("--env", "CartPole-v1", "--episodes", "0"), "episodes"),
+    ],
+)
+def test_what_cannot_be_probed_is_one_sentence(typed, tmp_path, options, said):
+    out = tmp_path / "never.json"
+    code, told, error = typed("probe", *options, "--out", str(out))
+    assert (code, told) == (2, "")
+    assert said in error
+    assert error.count("\n") == 1
+    assert not out.exists()
