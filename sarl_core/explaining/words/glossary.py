@@ -39,6 +39,10 @@ GLOSSARY = {
     "intervention": "a step at which the shield changed the action",
     "coverage": "share of states in which some rule applies",
     "fidelity": "share of the covered states in which the expert did what the rule says",
+    "never-rule": "a rule that forbids an action and leaves all others: what the expert does at "
+    "most rarely in states like these, or what it does not recover from",
+    "probe": "an episode played again up to some state, where an action is done for a while before "
+    "the expert has the controls; whether it fails then says what must not be done there",
     "freedom": "what the shield leaves to the agent: 100 % where no rule applies, 0 % where "
     "one decides every step",
     "audit": "rules held against a log of what somebody did, with no environment",
