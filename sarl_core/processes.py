@@ -57,7 +57,10 @@ class Processes(Executor):
         **named: Arguments.kwargs,
     ) -> Future[Result]:
         """See `Executor.submit`."""
+        import numpy as np
         from loky import ProcessPoolExecutor
+
+        from sarl_core.shared_arrays import handed_over
 
         with self._lock:
             if self._processes is not None:
@@ -71,6 +74,7 @@ class Processes(Executor):
                 initializer=_begin,
                 initargs=(os.getpid(), self._gives_way),
                 env={"OMP_NUM_THREADS": str(self._threads)},
+                job_reducers={np.ndarray: handed_over},
             )
             return self._submitted(call, *arguments, **named)
 

@@ -10,6 +10,7 @@ is one. What is between two bins is a threshold of the states, so the tree asks 
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -203,7 +204,10 @@ class _Part:
 
 @dataclass
 class _Growth:
-    """A tree while it grows; nodes have numbers in the order in which they were made."""
+    """A tree while it grows; nodes have numbers in the order in which they were made.
+
+    Of a million nodes a list of numbers would take as much as the states do.
+    """
 
     threads: ThreadPoolExecutor
     least: int
@@ -211,10 +215,10 @@ class _Growth:
     seed: int
     labels: int = 1
     spread: NDArray[np.uint16] = field(default_factory=lambda: np.zeros(0, dtype=np.uint16))
-    feature: list[int] = field(default_factory=lambda: [LEAF])
-    border: list[float] = field(default_factory=lambda: [0.0])
-    left: list[int] = field(default_factory=lambda: [LEAF])
-    right: list[int] = field(default_factory=lambda: [LEAF])
+    feature: array[int] = field(default_factory=lambda: array("q", [LEAF]))
+    border: array[float] = field(default_factory=lambda: array("d", [0.0]))
+    left: array[int] = field(default_factory=lambda: array("q", [LEAF]))
+    right: array[int] = field(default_factory=lambda: array("q", [LEAF]))
 
     def grow(
         self, numbers: NDArray[np.uint16], counts: Sequence[int], labels: NDArray[np.int64]
@@ -231,19 +235,21 @@ class _Growth:
         leaves = np.zeros(len(labels), dtype=np.int64)
         waiting = [_Part(0, 0, np.arange(len(labels)), keys)] if len(labels) else []
         del keys
-        sorted_parts: list[tuple[_Part, Future[tuple[TreeStructure, NDArray[np.int64]]]]] = []
+        sorted_parts: list[
+            tuple[int, NDArray[np.int64], Future[tuple[TreeStructure, NDArray[np.int64]]]]
+        ] = []
         while waiting:
             part = waiting.pop()
             leaves[part.rows] = part.node
             if not self._is_split(part):
                 continue
             if self.least * _MANY_NODES <= len(part.rows) <= _SORTED:
-                small = replace(part, counts=None)
-                sorted_parts.append((small, self.threads.submit(self._sorted, small)))
+                future = self.threads.submit(self._sorted, replace(part, counts=None))
+                sorted_parts.append((part.node, part.rows, future))
             else:
                 waiting += self._split(part)
-        for part, future in sorted_parts:
-            self._take(part, *future.result(), leaves)
+        for node, rows, future in sorted_parts:
+            self._take(node, rows, *future.result(), leaves)
         return self._in_order(leaves)
 
     def _is_split(self, part: _Part) -> bool:
@@ -323,7 +329,8 @@ class _Growth:
 
     def _take(
         self,
-        part: _Part,
+        node: int,
+        rows: NDArray[np.int64],
         below: TreeStructure,
         reached: NDArray[np.int64],
         leaves: NDArray[np.int64],
@@ -331,8 +338,8 @@ class _Growth:
         """Put a part that was sorted where its node is."""
         n = len(below.feature)
         # Its root is that node; the others stand at the end.
-        place = np.concatenate([[part.node], len(self.feature) + np.arange(n - 1)])
-        leaves[part.rows] = place[reached]
+        place = np.concatenate([[node], len(self.feature) + np.arange(n - 1)])
+        leaves[rows] = place[reached]
 
         def children(own: NDArray[np.int64]) -> list[int]:
             return [LEAF if one == LEAF else int(place[one]) for one in own.tolist()]
@@ -342,10 +349,10 @@ class _Growth:
             (self.left, children(below.children_left)),
             (self.right, children(below.children_right)),
         ):
-            column[part.node] = values[0]
-            column += values[1:]
-        self.border[part.node] = float(below.threshold[0])
-        self.border += below.threshold[1:].tolist()
+            column[node] = values[0]
+            column.extend(values[1:])
+        self.border[node] = float(below.threshold[0])
+        self.border.extend(below.threshold[1:].tolist())
 
     def _in_order(self, leaves: NDArray[np.int64]) -> tuple[TreeStructure, NDArray[np.int64]]:
         """Nodes with the numbers of one who goes down the left side first."""

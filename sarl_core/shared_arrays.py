@@ -1,0 +1,62 @@
+"""Large arrays for other processes of this machine: written to a file once, and shared by all."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import tempfile
+import weakref
+from contextlib import suppress
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+_LEAST = 2**22  # bytes of an array that is worth a file
+_FILES: dict[int, Path] = {}
+"""Where arrays stand that were handed over, by their identity."""
+_LOCK = Lock()
+
+
+def handed_over(array: NDArray[Any]) -> Any:
+    """What `pickle` makes of an array, for `copyreg` and the like.
+
+    Args:
+        array: Any. A large one that nobody can change goes by a file, which is removed with it:
+            however often it is handed over, and to however many processes, it is there once.
+
+    Returns:
+        A function and its arguments, which give the array again.
+    """
+    if array.nbytes >= _LEAST and not array.flags.writeable and not array.dtype.hasobject:
+        with suppress(OSError):  # no room for a file: then as all others
+            return _opened, (_file_of(array),)
+    return array.__reduce_ex__(pickle.HIGHEST_PROTOCOL)
+
+
+def _file_of(array: NDArray[Any]) -> Path:
+    with _LOCK:
+        if id(array) not in _FILES:
+            handle, name = tempfile.mkstemp(suffix=".npy")
+            path = Path(name)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    np.save(file, array, allow_pickle=False)
+            except OSError:
+                path.unlink()
+                raise
+            _FILES[id(array)] = path
+            weakref.finalize(array, _remove, id(array))
+        return _FILES[id(array)]
+
+
+def _remove(identity: int) -> None:
+    with suppress(OSError):  # where a process has it open that ends later; its folder goes then
+        _FILES.pop(identity).unlink()
+
+
+def _opened(path: Path) -> NDArray[Any]:
+    # What stands in a file is mapped, so all processes look at the same memory.
+    return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
