@@ -8,6 +8,7 @@ import gc
 import inspect
 import os
 import sys
+import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
@@ -171,22 +172,25 @@ def _spinner(text: str) -> AbstractContextManager[object]:
 
 
 class Visit:
-    """A visitor's session, and the upload it holds.
+    """A visitor's session, and the demonstrations it holds.
 
     Attributes:
-        upload: Digest of the demonstrations uploaded last, "" where there are none.
+        upload: Digest of those uploaded last, or of others while there are none; "" before.
     """
 
     def __init__(self) -> None:
         self.upload = ""
 
     def bring(self, digest: str) -> None:
-        """Take an upload in the place of the one before, which is given back."""
+        """Take demonstrations in the place of those before, which are given back."""
         before, self.upload = self.upload, digest
-        _give_back(before)
+        if before != digest:
+            _give_back(before)
 
 
 _VISITS: set[Visit] = set()
+BACK_WITHIN = 20.0
+"""Seconds in which whoever has gone may come back: longer than a reload, or a tunnel."""
 
 
 def _give_back(digest: str) -> None:
@@ -196,9 +200,19 @@ def _give_back(digest: str) -> None:
 
 
 def _end(visit: Visit) -> None:
+    """Let a visit end, unless the same demonstrations are opened again at once.
+
+    A page that is loaded anew, and a connection that was lost, are the end of a session, too; what
+    was made from a large upload took long.
+    """
+    Thread(target=_leave, args=(visit, BACK_WITHIN), daemon=True).start()
+
+
+def _leave(visit: Visit, seconds: float = 0.0) -> None:
+    time.sleep(seconds)
     _VISITS.discard(visit)
     _give_back(visit.upload)
-    Thread(target=_collect, daemon=True).start()
+    _collect()
 
 
 def _collect() -> None:

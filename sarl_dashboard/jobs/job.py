@@ -19,8 +19,8 @@ from streamlit.runtime.scriptrunner import get_script_run_ctx
 
 from sarl_core.errors import SarlError, WorkError
 from sarl_core.progress import CancelledError
+from sarl_dashboard.cache import BACK_WITHIN
 
-GONE_AFTER = 20.0  # seconds without a connection: longer than a reload, or a tunnel
 
 Result = TypeVar("Result")
 
@@ -106,7 +106,7 @@ class Job(Generic[Result]):
         now = time.monotonic()
         if not self.is_left:
             self._seen = now
-        return not self._cancelled and now - self._seen < GONE_AFTER
+        return not self._cancelled and now - self._seen < BACK_WITHIN
 
     def progress(self, done: int, total: int) -> bool:
         """Tell how far it is, and ask whether to go on; for the work itself."""

@@ -203,8 +203,13 @@ def steps_of(opened: Demonstrations | MinedData) -> Demonstrations:
 
 
 def settle_choices() -> None:
-    """Leave to a mined file what was settled when it was mined; before anything is chosen."""
+    """Leave to a mined file what was settled when it was mined; before anything is chosen.
+
+    And let the visit hold what it has opened: after a reload it is that of another one.
+    """
     opened = None if data_problem() else _opened()
+    if opened is not None and (is_upload_chosen() or not visit().upload):
+        visit().bring(opened.digest)
     settle(Settled(opened.divider, opened.min_support) if isinstance(opened, MinedData) else None)
 
 

@@ -289,12 +289,32 @@ def test_what_a_visitor_uploaded_goes_when_the_last_who_holds_it_has_gone() -> N
     mine.bring(digest)
     visits = [visit for visit in cache._VISITS if visit.upload == digest and visit is not mine]
     for visit in visits:
-        cache._end(visit)
+        cache._leave(visit)
     assert digest in owners()
-    cache._end(mine)
+    cache._leave(mine)
     assert digest not in owners()
     assert "" in owners() or not owners()
     cache._VISITS.update(visits)  # the test's session goes on
+
+
+@pytest.mark.parametrize("way", ["the connection was lost", "the page was loaded anew"])
+def test_who_comes_back_to_an_upload_holds_what_was_made_of_it(way: str) -> None:
+    cache = sys.modules["sarl_dashboard.cache"]
+    app, digest = uploaded(csv_bytes(*ROWS))
+    for visit in cache._VISITS:  # as that of a new connection, or of a new session
+        visit.upload = ""
+    if way == "the connection was lost":
+        app.run()
+    else:
+        open_page("rules", data=app.session_state["_upload_id"])
+    assert digest in owners()
+    (visit,) = (visit for visit in cache._VISITS if visit.upload == digest)
+    gone = cache.Visit()
+    gone.upload = digest
+    cache._leave(gone)
+    assert digest in owners()
+    visit.bring("")
+    assert digest not in owners()
 
 
 def test_a_second_upload_takes_the_place_of_the_first() -> None:
@@ -313,6 +333,6 @@ def test_what_is_made_after_the_last_has_gone_is_not_kept() -> None:
     visit.bring("a digest")
     cache.keep("early", megabytes(0.1), "a digest")
     assert "a digest" in owners()
-    cache._end(visit)
+    cache._leave(visit)
     cache.keep("late", megabytes(0.1), "a digest")
     assert "a digest" not in owners()
