@@ -98,7 +98,8 @@ class ColumnForm:
                 contents: list[tuple[Content, str]] = [
                     (file.getbuffer(), file.name) for file in files
                 ]
-                previews = preview_columns(contents, columns=said)
+                with st.spinner("Looking at the columns …"):
+                    previews = preview_columns(contents, columns=said)
             except Exception:  # whoever reads the files says why
                 previews = ()
         form = cls(key, previews)

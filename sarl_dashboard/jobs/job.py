@@ -21,7 +21,6 @@ from sarl_core.errors import SarlError, WorkError
 from sarl_core.progress import CancelledError
 from sarl_dashboard.cache import BACK_WITHIN
 
-
 Result = TypeVar("Result")
 
 

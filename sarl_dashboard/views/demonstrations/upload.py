@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
 
 import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import ColumnRole, read_files
+from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.distributed.mined_files import is_mined_file, read_mined_data
+from sarl_core.processes import run_each
 from sarl_dashboard.components.column_form import ColumnForm
 from sarl_dashboard.components.journey.words import with_words
+from sarl_dashboard.components.run_bar import Offer, run_bar, watched
+from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.state.data import set_upload, steps_of, uncombined_demonstrations
 from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
@@ -24,6 +31,10 @@ from sarl_dashboard.text import refuse
 
 _LEFT_OUT = "--missing drop"  # what an error says where steps that lack a value can be left out
 _LOGGER = logging.getLogger(__name__)
+PLACE = Place[Demonstrations | MinedData]("reading")
+_AT_ONCE = 20_000_000  # bytes that are read while one waits
+_BYTES_A_SECOND = 30_000_000  # of text, which takes longest
+_MOST = 0.95  # of a bar that only knows how long such work usually takes
 
 
 def uploaded_files() -> list[UploadedFile]:
@@ -39,32 +50,58 @@ def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
     """
     st.session_state.pop("_upload_error", None)
     st.session_state["_upload_columns"] = columns
-    files = [(file.getbuffer(), file.name) for file in uploaded_files()]
+    if PLACE.job is not None:
+        PLACE.job.cancel()
+    files = uploaded_files()
     if not files:
         return
     try:
+        if sum(file.size for file in files) > _AT_ONCE:
+            PLACE.begin(_job_of(_request()))
+            return
         with st.spinner("Reading and checking …"):
-            upload = _read(files, columns)
+            upload = _read(*_request())
     except SarlError as error:
         st.session_state["_upload_error"] = str(error)
         return
-    except Exception as error:  # whatever a reader did not foresee, what was chosen before stays
-        _LOGGER.exception("An upload could not be read")
-        st.session_state["_upload_error"] = str(
-            InputError(
-                f"{files[0][1]}: it cannot be read, and this program does not know why "
-                f"({type(error).__name__}); save it again in another format"
-            )
-        )
-        return
-    set_upload(upload, file_name=", ".join(name for _, name in files))
+    _take(upload)
+
+
+def _take(upload: Demonstrations | MinedData) -> None:
+    """Keep what was read, and choose it."""
+    with st.spinner("Keeping it in the library …"):
+        set_upload(upload, file_name=", ".join(file.name for file in uploaded_files()))
     st.toast(f"Read {steps_of(upload).whole.steps:,} steps.", icon=":material/check:")
 
 
+class _Request(NamedTuple):
+    """What is to be read, and how."""
+
+    files: Sequence[tuple[memoryview, str]]
+    columns: Mapping[str, ColumnRole] | None
+    env_id: Environment | None
+    missing: Missing
+
+
+def _request() -> _Request:
+    """What the uploader holds, with what is said of it."""
+    return _Request(
+        [(file.getbuffer(), file.name) for file in uploaded_files()],
+        st.session_state["_upload_columns"],
+        environment(),
+        "drop" if st.session_state.get("upload_missing") else "refuse",
+    )
+
+
 def _read(
-    files: Sequence[tuple[memoryview, str]], columns: Mapping[str, ColumnRole] | None
+    files: Sequence[tuple[memoryview, str]],
+    columns: Mapping[str, ColumnRole] | None,
+    env_id: Environment | None,
+    missing: Missing,
 ) -> Demonstrations | MinedData:
-    if any(is_mined_file(name) for _, name in files):
+    try:
+        if not any(is_mined_file(name) for _, name in files):
+            return read_files(files, env_id=env_id, columns=columns, missing=missing)
         (content, name), *others = files
         if others:
             raise InputError(
@@ -72,12 +109,72 @@ def _read(
             )
         with naming(name):
             return read_mined_data(content)
-    return read_files(
-        files,
-        env_id=environment(),
-        columns=columns,
-        missing="drop" if st.session_state.get("upload_missing") else "refuse",
+    except SarlError:
+        raise
+    except Exception as error:  # whatever a reader did not foresee, what was chosen before stays
+        _LOGGER.exception("An upload could not be read")
+        raise InputError(
+            f"{files[0][1]}: it cannot be read, and this program does not know why "
+            f"({type(error).__name__}); save it again in another format"
+        ) from error
+
+
+def _job_of(request: _Request) -> Callable[[], Job[Demonstrations | MinedData]]:
+    """What begins to read large files beside the page."""
+    key = _uploaded()
+    size = sum(len(content) for content, _ in request.files)
+
+    def work(job: Job[Demonstrations | MinedData]) -> None:
+        begun = time.monotonic()
+
+        def progress(done: int, total: int) -> bool:
+            seconds = time.monotonic() - begun
+            job.text = f"Reading and checking {size / 1e6:,.0f} MB: {seconds:.0f} s"
+            job.done = min(seconds * _BYTES_A_SECOND / size, _MOST)
+            return job.wanted()
+
+        # A thread: what it has read is many times as large as what is said of it, and whoever calls
+        # it off need not wait for its end.
+        executor = ThreadPoolExecutor(1)
+        try:
+            (job.result,) = run_each(_read, [request], executor=executor, progress=progress)
+        finally:
+            executor.shutdown(wait=False)
+
+    return lambda: Job(key, work, 1)
+
+
+def _uploaded() -> tuple[str, ...]:
+    return tuple(file.file_id for file in uploaded_files())
+
+
+def _show_reading() -> bool:
+    """How far reading beside the page is, or that it was called off; whether either is so."""
+    job = PLACE.job
+    if job is None or job.key != _uploaded():
+        return False
+    upload, error = job.result, job.error
+    if not job.running and (upload is not None or error is not None) and not job.cancelled:
+        job.result = job.error = None
+        if upload is not None:
+            _take(upload)
+        else:
+            st.session_state["_upload_error"] = str(error)
+        if not st.session_state.get("_upload_mapped"):
+            _form().open_for(st.session_state.get("_upload_error"))
+        st.rerun()
+    if not (job.running or job.cancelled):
+        return False
+    offer = Offer(
+        key=job.key,
+        start=lambda: _job_of(_request())(),
+        about="Large files are read beside the page.",
+        complete=False,
+        cancelled="Cancelled. Nothing has changed: what was chosen before still is.",
+        label="Read",
     )
+    watched(PLACE, lambda _: run_bar(PLACE, offer))
+    return True
 
 
 def _read_again() -> None:
@@ -115,7 +212,8 @@ def read_new_upload() -> None:
     """Read what was uploaded just now; open the form where the columns are not clear."""
     st.session_state["_upload_mapped"] = False
     read_upload()
-    _form().open_for(st.session_state.get("_upload_error"))
+    if not PLACE.at_work:
+        _form().open_for(st.session_state.get("_upload_error"))
 
 
 def upload_section(*, expanded: bool) -> None:
@@ -152,6 +250,8 @@ def upload_section(*, expanded: bool) -> None:
                 "that Gymnasium knows."
             ),
         )
+        if _show_reading():
+            return
         form = _form()
         # What is wrong with a choice in the form stands beside its button.
         in_form = form.is_open and bool(st.session_state.get("_upload_mapped"))
