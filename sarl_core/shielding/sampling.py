@@ -82,7 +82,8 @@ def feature_spans(observations: NDArray[np.float32]) -> tuple[Span, ...]:
         np.where(same, low - np.float32(0.5), low),
         np.where(same, high + np.float32(0.5), high),
     )
-    middle = np.median(observations, axis=0).astype(np.float32)
+    # One after the other: the median of all at once would take a second copy of them.
+    middle = np.array([np.median(column) for column in observations.T], dtype=np.float32)
     return tuple(map(Span, low.tolist(), middle.tolist(), high.tolist()))
 
 
