@@ -14,6 +14,7 @@ from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_dashboard.cache import RESULTS
+from sarl_dashboard.components.run_bar import run_bar
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.data import chosen_demonstrations
@@ -52,11 +53,12 @@ def elsewhere_notice(
             _say(elsewhere, fidelity, more)
             return
         job = cross_fitting.job_of(key)
+        takes_minutes = len(demonstrations) > cross_fitting.UNASKED
         if job is not None and job.error is not None:
             st.caption(
                 in_full(f"what the rules are worth in other episodes is not known: {job.error}")
             )
-        elif job is None and len(demonstrations) > cross_fitting.UNASKED:
+        elif takes_minutes and (job is None or job.cancelled):
             st.button(
                 "Find out what they are worth in other episodes",
                 key="elsewhere",
@@ -66,6 +68,8 @@ def elsewhere_notice(
                 help=f"Of more than {cross_fitting.UNASKED:,} steps this takes minutes, and a "
                 "processor",
             )
+        elif takes_minutes:
+            run_bar(cross_fitting.PLACE, None)
         else:
             done = "" if job is None else f" ({job.done} of {max(job.total, 1)})"
             st.caption(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from sarl_core import Demonstrations, load_demonstrations
 from sarl_core.explaining.words.cross_fit import elsewhere_text, judged_sentence
 from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
 from sarl_core.mining.validation.cross_fitting import Judged, cross_fit
+from sarl_core.progress import Progress, report
 from tests.app.screens import ROUTER, html, metrics, open_page
 
 CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
@@ -83,7 +85,7 @@ def test_random_labels_end_with_a_warning(episodes: int) -> None:
     found = cross_fit(noise).at(UNFILTERED)
     assert found.fidelity.share == pytest.approx(0.5, abs=0.05)
     assert judged_sentence(found) in html(app)
-    cache._end(visit)
+    cache._leave(visit)
 
 
 def test_compact_rules_are_not_mined_again() -> None:
@@ -99,6 +101,19 @@ def test_what_takes_minutes_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(module, "UNASKED", 1_000)
     module.RESULTS.clear()
     app = open_page("thresholds", data="pendulum")
+    fit = module.cross_fit
+
+    def waits(*given: Any, progress: Progress, **named: Any) -> Any:
+        while True:
+            report(progress, 0, 5)
+            time.sleep(0.05)
+
+    monkeypatch.setattr(module, "cross_fit", waits)
+    app.button(key="elsewhere").click().run()
+    job = app.session_state["_job_elsewhere"]
+    app.button(key="cancel_elsewhere").click().run()
+    assert not job.running
+    monkeypatch.setattr(module, "cross_fit", fit)
     app.button(key="elsewhere").click().run()
     until(app, "mined without it, they are right in")
     assert not [button for button in app.button if button.key == "elsewhere"]
