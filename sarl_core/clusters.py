@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
+from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
 
 from sarl_core.errors import InputError, WorkError, needing_extras, quoted
@@ -20,6 +21,7 @@ VARIABLE = "SARL_CLUSTER"
 """The environment variable that names a cluster for the jobs of a dashboard."""
 _LOCAL = re.compile(r"local:(?P<workers>\d{1,3})(?::(?P<memory>\d+(?:\.\d+)?\s*[kMGT]i?B))?")
 _SECONDS = 10  # to wait for a scheduler, and for its first worker
+_START_SECONDS = 15  # to wait for processes of this machine
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
@@ -132,6 +134,7 @@ def cluster(address: str) -> Iterator[Any]:
             silence_logs=logging.CRITICAL,
         )
         with started, Client(started) as client:
+            _require_start(client, int(local["workers"]), address)
             yield client
         return
     try:
@@ -143,6 +146,33 @@ def cluster(address: str) -> Iterator[Any]:
     with client:
         _require_same_package(client, address)
         yield client
+
+
+def _begun() -> int:
+    """Load what most work needs, and say how many bytes it takes to have that."""
+    from distributed import get_worker
+
+    for name in ("sarl_core.mining.distributed.mining", "pyarrow.parquet", "sklearn.tree"):
+        import_module(name)
+    return int(get_worker().monitor.get_process_memory())
+
+
+def _require_start(client: Any, workers: int, address: str) -> None:
+    """Refuse processes of this machine that would end, or wait, before they have done anything."""
+    problem = InputError(
+        f"the processes of {quoted(address)} do not start, as with too little memory; give each "
+        "more, as local:2:1GB, or leave the memory out"
+    )
+    try:
+        client.wait_for_workers(workers, timeout=_START_SECONDS)
+        taken = client.submit(_begun, pure=False).result(_START_SECONDS)
+    except TimeoutError as error:
+        raise problem from error
+    except losses() as error:
+        raise problem from error
+    # Dask lets a worker rest, for good, whose memory is nearly full.
+    if any(2 * taken > one["memory_limit"] for one in client.scheduler_info()["workers"].values()):
+        raise problem
 
 
 def _require_same_package(client: Any, address: str) -> None:

@@ -189,6 +189,10 @@ def test_one_episode_cannot_be_held_out(tmp_path: Path, mine: Mine) -> None:
         ("scheduler", "'scheduler' is no cluster; give the address of a scheduler"),
         ("local:0", "'local:0' has no process; give one or more"),
         ("local:two", "is no cluster"),
+        (
+            "local:1:150MB",
+            "the processes of 'local:1:150MB' do not start",
+        ),
         ("tcp://127.0.0.1:9", "no scheduler answers at 'tcp://127.0.0.1:9'; check the address"),
     ],
 )
