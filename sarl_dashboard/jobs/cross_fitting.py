@@ -7,6 +7,7 @@ it as soon as it is there.
 
 from __future__ import annotations
 
+import time
 from concurrent.futures import Executor
 
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -26,6 +27,7 @@ from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider
 
 UNASKED = 250_000  # steps up to which it is made without being asked for
 PLACE = Place[CrossFit]("elsewhere")
+_DRAWING = 2.0  # seconds in which a browser draws a page; processes that start would hinder it
 
 
 def key_of(demonstrations: Demonstrations, divider: int) -> tuple[object, ...]:
@@ -98,12 +100,19 @@ def job_of(key: tuple[object, ...]) -> Job[CrossFit] | None:
     return job if job is not None and job.key == key else None
 
 
-def begin(demonstrations: Demonstrations, divider: int) -> None:
-    """Grow the trees without each fold, in the place of what is on its way; for a callback too."""
+def begin(demonstrations: Demonstrations, divider: int, *, after: float = 0.0) -> None:
+    """Grow the trees without each fold, in the place of what is on its way; for a callback too.
+
+    Args:
+        demonstrations: To be parted.
+        divider: Number of intervals of continuous actions.
+        after: Seconds to wait first.
+    """
     key, session = key_of(demonstrations, divider), owner()
     combined, learner = combining.pairs(demonstrations), learner_of(demonstrations)
 
     def work(executor: Executor, progress: Progress) -> CrossFit:
+        time.sleep(after)
         return cross_fit(
             demonstrations,
             divider=divider,
@@ -128,4 +137,4 @@ def make_ready() -> None:
     job = job_of(key)
     # What was made may have been let go of since, for want of room.
     if key not in RESULTS and (job is None or not (job.running or job.error)):
-        begin(demonstrations, divider)
+        begin(demonstrations, divider, after=_DRAWING)
