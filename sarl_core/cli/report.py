@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from sarl_core.cli import terminal
-from sarl_core.cli.inputs import read_agent, read_demonstrations, sign_off_of
+from sarl_core.cli.inputs import is_mined_file, read_agent, read_demonstrations, sign_off_of
 from sarl_core.cli.options import (
     Columns,
     Json,
@@ -22,6 +22,7 @@ from sarl_core.cli.options import (
 )
 from sarl_core.cli.stand_ins import called
 from sarl_core.environments.environment import Environment, EnvironmentOrId
+from sarl_core.errors import InputError
 
 if TYPE_CHECKING:
     from sarl_core.agents.agent import Agent
@@ -43,7 +44,7 @@ def report(
             "--demonstrations",
             metavar="FILE",
             show_default=False,
-            help="The demonstrations they are about.",
+            help="The demonstrations they are about, or a .mined file.",
         ),
     ],
     out: Annotated[Path, out_option("The file to write.", metavar="FILE.html")],
@@ -124,7 +125,21 @@ def report(
         from sarl_core.studies.certificate_files import load_certificate
 
         rule_set = RuleSet.load(rules)
-        read = read_demonstrations(demonstrations, env, columns, missing)
+        trees = None
+        if is_mined_file(demonstrations):
+            from sarl_core.mining.distributed.mined_files import load_mined_data
+
+            if columns or missing != "refuse":
+                raise InputError(
+                    f"{demonstrations}: how its steps are read was settled when it was mined; "
+                    "leave that out"
+                )
+            data = load_mined_data(demonstrations)
+            read, trees = data.sample, data.trees
+            if rule_set.divider != data.divider and not read.is_discrete:
+                trees = None  # grown from a sample, which is refused
+        else:
+            read = read_demonstrations(demonstrations, env, columns, missing)
         given = recoded(read, rule_set.source.features, called=called(demonstrations))
         card, sign_off = read_card(rules), sign_off_of(rule_set)
         results = [one for path in comparison or () for one in read_results(path)]
@@ -175,6 +190,7 @@ def report(
             card=card,
             comparison=results,
             certificates=certificates,
+            trees=trees,
             progress=advance,
         )
         document.save(out)

@@ -76,6 +76,21 @@ def test_a_lower_bound_drops_rules(run, mined_file, tmp_path):
     assert {rule.id for rule in RuleSet.load(sure)} == left
 
 
+def test_a_report_is_made_of_a_mined_file_as_of_demonstrations(run, mined_file, tmp_path, capsys):
+    rules, out = tmp_path / "rules.json", tmp_path / "report.html"
+    run("mine", mined_file, *FILTERED, "--out", rules)
+    command = ("report", rules, "--demonstrations", mined_file, "--frames", "0", "--out", out)
+    assert f"{len(RuleSet.load(rules)):,} rules" in run(*command)
+    made = out.read_bytes()
+    steps = RuleSet.load(rules).source.steps
+    assert f"{steps:,} steps" in made.decode()
+    assert f"report {rules} --demonstrations {mined_file}" in made.decode()
+    run(*command)
+    assert out.read_bytes() == made
+    assert main([*map(str, command), "--missing", "drop"]) == 2
+    assert "how its steps are read was settled when it was mined" in capsys.readouterr().err
+
+
 def test_a_mined_file_answers_check_and_landscape(run, mined_file, tmp_path):
     document = json.loads(run("check", mined_file, "--json"))
     assert 0 < document["steps"] < 15_000

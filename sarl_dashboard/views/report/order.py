@@ -140,6 +140,4 @@ def commands(
             "--out": "report.html",
         },
     )
-    if raw.sample_of is not None:  # of which the command makes no report
-        return (mined,) if mined else ()
     return (mined, again) if mined else (again,)
