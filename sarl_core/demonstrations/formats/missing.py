@@ -95,6 +95,18 @@ def gaps_together(parts: Sequence[StepGaps]) -> StepGaps:
     )
 
 
+class TooFewStepsError(InputError):
+    """Hardly a step lacks nothing.
+
+    Attributes:
+        left: Which do, (0,) or (1,).
+    """
+
+    def __init__(self, message: str, left: NDArray[np.int64]) -> None:
+        super().__init__(message)
+        self.left = left
+
+
 def complete_rows(
     holes: Holes,
     infinite: Holes,
@@ -127,9 +139,10 @@ def complete_rows(
             f'leave out the steps that lack a value (--missing drop, in Python missing="drop")'
         )
     if n - count < 2:
-        raise InputError(
+        raise TooFewStepsError(
             f"{where}, so {'no step' if n == count else 'one step alone'} would be left; leave out "
-            "the columns that are empty instead"
+            "the columns that are empty instead",
+            np.flatnonzero(~lacking),
         )
     return np.flatnonzero(~lacking), gaps.note
 

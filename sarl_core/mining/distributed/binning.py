@@ -32,8 +32,10 @@ def bin_piece(
     Returns:
         Those that are mined from.
     """
-    rows = placement.placed(read_piece(piece, reading), piece.file)
-    mined = ~np.isin(rows.episodes, placement.held_out)
+    given = read_piece(piece, reading)
+    assert given is not None  # others were left out when they were surveyed
+    rows = placement.placed(given.steps, piece.file)
+    mined = given.real & ~np.isin(rows.episodes, placement.held_out)
     states, actions = rows.observations[mined], rows.action_columns[mined]
     bins = np.empty(states.shape[::-1], dtype=np.uint16)
     for feature, own in enumerate(borders):

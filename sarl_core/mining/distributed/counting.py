@@ -59,12 +59,18 @@ def count_piece(
     Returns:
         One entry a tree.
     """
-    rows = placement.placed(read_piece(piece, reading), piece.file)
+    given = read_piece(piece, reading)
+    assert given is not None  # others were left out when they were surveyed
+    rows = placement.placed(given.steps, piece.file)
+    held = np.isin(rows.episodes, placement.held_out)
+    sides = given.real & ~held, given.real & held
     dimensions = label_dimensions(rows, divider)
     counted = []
     for index, (structure, dimension) in enumerate(zip(structures, dimensions, strict=True)):
         labels = dimension.labels_of(rows.action_columns[:, index])
-        counted.append(_counted(rows, structure, labels, dimension.n_labels, placement.held_out))
+        counted.append(
+            _counted(rows, structure, labels, dimension.n_labels, placement.held_out, sides)
+        )
     return counted
 
 
@@ -74,11 +80,11 @@ def _counted(
     labels: Integers,
     n_labels: int,
     held_out: Integers,
+    sides: tuple[NDArray[np.bool_], NDArray[np.bool_]],
 ) -> TreeCounts:
-    held = np.isin(rows.episodes, held_out)
+    mined, held = sides
     n, d = len(structure.feature), rows.observations.shape[1]
     leaves = structure.apply(rows.observations)
-    mined = ~held
     counts = np.bincount(leaves[mined] * n_labels + labels[mined], minlength=n * n_labels)
     least = np.full((n, d), np.inf, dtype=np.float32)
     most = np.full((n, d), -np.inf, dtype=np.float32)

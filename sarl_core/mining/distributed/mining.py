@@ -179,7 +179,9 @@ def mine_on_cluster(
     pieces = pieces_of(paths)
     with saying_losses():
         advance(0.0)
-        layout, reading = _surveyed(client, pieces, reading, lambda share: advance(0.2 * share))
+        layout, pieces, reading = _surveyed(
+            client, pieces, reading, lambda share: advance(0.2 * share)
+        )
         held_out = _held_out(layout, plan)
         mined = layout.sample
         if len(held_out):
@@ -239,15 +241,29 @@ def mine_on_cluster(
 
 def _surveyed(
     client: Any, pieces: Sequence[Piece], reading: Reading, advance: Callable[[float], None]
-) -> tuple[Layout, Reading]:
-    """The first pass. How the first piece is understood, all others are read."""
+) -> tuple[Layout, list[Piece], Reading]:
+    """The first pass; with the pieces that hold steps.
+
+    How the first piece of several steps is understood, all others are read.
+    """
     share = min(1.0, SAMPLE_ROWS / sum(piece.rows for piece in pieces))
-    first = client.submit(survey_piece, pieces[0], reading, share).result()
+    one_by_one = (client.submit(survey_piece, piece, reading, share).result() for piece in pieces)
+    several = ((at, one) for at, one in enumerate(one_by_one) if one is not None and one.rows > 1)
+    place, first = next(several, (0, None))
+    if first is None:
+        raise InputError(
+            "hardly a step of these files has all of its values; leave out the columns that are "
+            "empty instead"
+        )
     if reading.columns is None:
         reading = replace(reading, columns=columns_of_head(first.head))
-    futures = [client.submit(survey_piece, piece, reading, share) for piece in pieces[1:]]
-    surveys = [first, *(one.result() for one in worked_out(futures, advance))]
-    return layout_of(pieces, surveys), reading
+    others = [*pieces[:place], *pieces[place + 1 :]]
+    futures = [client.submit(survey_piece, piece, reading, share) for piece in others]
+    surveys = [one.result() for one in worked_out(futures, advance)]
+    surveys.insert(place, first)
+    there = [known for known in zip(pieces, surveys, strict=True) if known[1] is not None]
+    pieces = [piece for piece, _ in there]
+    return layout_of(pieces, [survey for _, survey in there]), pieces, reading
 
 
 def _held_out(layout: Layout, plan: ClusterPlan) -> NDArray[np.int64]:

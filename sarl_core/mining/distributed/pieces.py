@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,9 @@ from sarl_core.demonstrations.formats.arrow.parquet_file import is_text, refusin
 from sarl_core.demonstrations.formats.arrow.table import arrow_table
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.mapping.roles import ROLE_WORDS, Roles
-from sarl_core.demonstrations.formats.missing import Missing
+from sarl_core.demonstrations.formats.missing import Missing, TooFewStepsError
 from sarl_core.demonstrations.formats.naming import naming
-from sarl_core.demonstrations.formats.recording import to_demonstrations
+from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
 from sarl_core.demonstrations.formats.sets.file_set import files_in_folder, natural_order
 from sarl_core.demonstrations.formats.tables import recording_from_table
 from sarl_core.demonstrations.recoding import recoded
@@ -179,7 +179,25 @@ def opened_file(path: str) -> Iterator[Any]:
         raise InputError("it is gone since the work began; put it back, and begin anew") from error
 
 
-def read_piece(piece: Piece, reading: Reading) -> Demonstrations:
+class PieceSteps(NamedTuple):
+    """What a piece holds.
+
+    Attributes:
+        steps: At least two, as demonstrations are.
+        own: How many of them, from the first, are steps of the piece: where it has one alone, a
+            copy stands behind that.
+    """
+
+    steps: Demonstrations
+    own: int
+
+    @property
+    def real(self) -> NDArray[np.bool_]:
+        """Which are, (N,)."""
+        return np.arange(len(self.steps)) < self.own
+
+
+def read_piece(piece: Piece, reading: Reading) -> PieceSteps | None:
     """Read a piece.
 
     Args:
@@ -187,7 +205,8 @@ def read_piece(piece: Piece, reading: Reading) -> Demonstrations:
         reading: How.
 
     Returns:
-        Its steps, of which the first and the last may belong to episodes that go on elsewhere.
+        Its steps, of which the first and the last may belong to episodes that go on elsewhere; None
+        where each lacks a value, and such steps are left out.
 
     Raises:
         InputError: If it cannot be read, or holds something wrong; it names the file.
@@ -209,12 +228,37 @@ def read_piece(piece: Piece, reading: Reading) -> Demonstrations:
                 "no column says to which episode a row belongs, and files are cut anywhere; number "
                 "the episodes, or say which column does: --column NAME=episode"
             )
-        read = to_demonstrations(recording, reading.description, reading.missing)
+        count = len(recording.actions)
+        if count == 1:
+            recording = _doubled(recording, 0)
+        try:
+            read = to_demonstrations(recording, reading.description, reading.missing)
+        except TooFewStepsError as error:
+            if not len(error.left) or count == 1:
+                return None
+            recording, count = _doubled(recording, int(error.left[0])), 1
+            read = to_demonstrations(recording, reading.description, reading.missing)
         if reading.formulas:
             read = with_formulas(read, reading.formulas)
         if reading.features is not None:
             read = recoded(read, reading.features, called="it")
-        return read
+        return PieceSteps(read, 1 if count == 1 else len(read))
+
+
+def _doubled(recording: Recording, row: int) -> Recording:
+    """One step of a piece, and a copy of it as another episode."""
+
+    def twice(values: Any) -> Any:
+        return None if values is None else np.asarray(values)[[row, row]]
+
+    names = ["observations", "actions", "missing_actions", "steps", "rewards"]
+    names += ["terminated", "truncated", "times", "rows"]
+    episodes = twice(recording.episodes).astype(np.int64)
+    return replace(
+        recording,
+        episodes=episodes + np.array([0, 1]),
+        **{name: twice(getattr(recording, name)) for name in names},
+    )
 
 
 def has_named_episodes(piece: Piece, columns: Sequence[ColumnUse]) -> bool:

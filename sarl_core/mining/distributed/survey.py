@@ -126,7 +126,7 @@ class Layout:
         return Placement(some_rows(self.sample, first), self.offsets, held_out)
 
 
-def survey_piece(piece: Piece, reading: Reading, share: float) -> Survey:
+def survey_piece(piece: Piece, reading: Reading, share: float) -> Survey | None:
     """Look at a piece.
 
     Args:
@@ -135,23 +135,28 @@ def survey_piece(piece: Piece, reading: Reading, share: float) -> Survey:
         share: Of all rows that is to be in the sample.
 
     Returns:
-        What it holds.
+        What it holds; None where that is nothing.
     """
-    read = read_piece(piece, reading)
+    given = read_piece(piece, reading)
+    if given is None:
+        return None
+    read, count = given
     keys = row_keys(read)
     chosen = keys < np.uint64(min(share * _MOST, _MOST - 2**12)) if share < 1.0 else keys >= 0
+    chosen &= given.real
     some = chosen | (np.arange(len(read)) < _FEWEST)
-    numbers = read.episodes[read.episode_starts]
+    keys, actions = keys[:count], read.action_columns[:count]
+    numbers = read.episodes[read.episode_starts[read.episode_starts < count]]
     return Survey(
         head=some_rows(read, some),
         sampled=chosen[some],
-        rows=len(read),
+        rows=count,
         episodes=np.unique(numbers),
         rising=bool((np.diff(numbers) > 0).all()),
         named=has_named_episodes(piece, read.columns),
         sums=(_sum(keys), _sum(_mixed(keys ^ _OTHER))),
-        low=tuple(read.action_columns.min(axis=0).tolist()),
-        high=tuple(read.action_columns.max(axis=0).tolist()),
+        low=tuple(actions.min(axis=0).tolist()),
+        high=tuple(actions.max(axis=0).tolist()),
     )
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from sarl_core import Demonstrations, save_demonstrations
 from sarl_core.clusters import cluster
+from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.distributed.mining import ClusterPlan, mine_on_cluster
 from sarl_core.mining.distributed.pieces import Reading, parquet_paths
@@ -58,7 +59,8 @@ def cut(demonstrations: Demonstrations, folder: Path, files: int) -> Path:
 def mine(client: Any) -> Mine:
     """Mines files on the cluster, by the options of a plan."""
 
-    def mined(folder: Path, **plan: Any) -> MinedData:
-        return mine_on_cluster(client, parquet_paths([folder]), Reading(), ClusterPlan(**plan))
+    def mined(folder: Path, missing: Missing = "refuse", **plan: Any) -> MinedData:
+        reading = Reading(missing=missing)
+        return mine_on_cluster(client, parquet_paths([folder]), reading, ClusterPlan(**plan))
 
     return mined

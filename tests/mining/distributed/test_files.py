@@ -222,3 +222,29 @@ def test_work_that_ends_every_worker() -> None:
         saying_losses(),
     ):
         other.submit(os._exit, 1).result()
+
+
+def test_files_of_one_step_or_of_none_that_is_whole_make_no_difference(
+    tmp_path: Path, mine: Mine
+) -> None:
+    table = steps().assign(step=np.arange(400) % 50)
+    table.loc[200:249, "obs_gap"] = np.nan
+    table.loc[300:309, "obs_speed"] = np.nan
+    cuts = [(0, 1), (1, 180), (180, 200), (200, 230), (230, 251), (251, 300), (300, 311)]
+    cuts += [(311, 399), (399, 400)]
+    cut = folder_of(tmp_path / "cut", *(table[first:end] for first, end in cuts))
+    whole = folder_of(tmp_path / "whole", table)
+    one = mine(whole, missing="drop", hold_out=0.4, seed=1)
+    other = mine(cut, missing="drop", hold_out=0.4, seed=1)
+    assert one.trees[0].counts[0].sum() + one.held_out[0].lengths.sum() == 340
+    assert other.trees[0].source.steps == one.trees[0].source.steps
+    assert other.sample.whole.digest == one.sample.whole.digest
+    assert other.trees[0].counts.tolist() == one.trees[0].counts.tolist()
+    assert other.held_out[0].lengths.tolist() == one.held_out[0].lengths.tolist()
+    assert other.held_out[0].numbers.tolist() == one.held_out[0].numbers.tolist()
+
+
+def test_files_without_any_whole_step_are_refused(tmp_path: Path, mine: Mine) -> None:
+    table = steps().assign(obs_gap=np.nan, obs_speed=np.nan)
+    with pytest.raises(InputError, match="hardly a step of these files has all of its values"):
+        mine(folder_of(tmp_path / "logs", table[:200], table[200:]), missing="drop")
