@@ -224,10 +224,10 @@ def _collect() -> None:
     gc.unfreeze()
     gc.collect()
     gc.freeze()
-    _release()
+    release()
 
 
-def _release() -> None:
+def release() -> None:
     """Give what is free to the system: what allocators keep looks like use to whoever watches."""
     import pyarrow
 

@@ -55,7 +55,7 @@ class TableFile(Protocol):
     def name(self) -> str:
         """Of the file."""
 
-    def getbuffer(self) -> memoryview:
+    def getvalue(self) -> bytes:
         """Its content."""
 
 
@@ -96,7 +96,7 @@ class ColumnForm:
         if files:
             try:
                 contents: list[tuple[Content, str]] = [
-                    (file.getbuffer(), file.name) for file in files
+                    (memoryview(file.getvalue()), file.name) for file in files
                 ]
                 with st.spinner("Looking at the columns …"):
                     previews = preview_columns(contents, columns=said)

@@ -145,9 +145,6 @@ class _LibraryFile(NamedTuple):
     def getvalue(self) -> bytes:
         return self.content
 
-    def getbuffer(self) -> memoryview:
-        return memoryview(self.content)
-
 
 @dataclass(frozen=True, eq=False)
 class _Log:

@@ -20,6 +20,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.distributed.mined_files import is_mined_file, read_mined_data
 from sarl_core.processes import run_each
+from sarl_dashboard.cache import release
 from sarl_dashboard.components.column_form import ColumnForm
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
@@ -71,6 +72,7 @@ def _take(upload: Demonstrations | MinedData) -> None:
     """Keep what was read, and choose it."""
     with st.spinner("Keeping it in the library …"):
         set_upload(upload, file_name=", ".join(file.name for file in uploaded_files()))
+    release()  # what reading has left
     st.toast(f"Read {steps_of(upload).whole.steps:,} steps.", icon=":material/check:")
 
 
@@ -86,7 +88,8 @@ class _Request(NamedTuple):
 def _request() -> _Request:
     """What the uploader holds, with what is said of it."""
     return _Request(
-        [(file.getbuffer(), file.name) for file in uploaded_files()],
+        # A buffer of its own would be a copy.
+        [(memoryview(file.getvalue()), file.name) for file in uploaded_files()],
         st.session_state["_upload_columns"],
         environment(),
         "drop" if st.session_state.get("upload_missing") else "refuse",

@@ -147,7 +147,7 @@ def import_form(opened: Library, author: str) -> None:
         st.session_state["_library_read"] = file.file_id
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"file{ENDING}"
-            path.write_bytes(file.getbuffer())
+            path.write_bytes(file.getvalue())
             try:
                 items = import_bundle(opened, path, author=author)
             except SarlError as error:
