@@ -284,6 +284,11 @@ def _held_out(layout: Layout, plan: ClusterPlan) -> NDArray[np.int64]:
 
 def _without(sample: Demonstrations, held_out: NDArray[np.int64]) -> Demonstrations:
     rows = ~np.isin(sample.episodes, held_out)
+    if np.count_nonzero(rows) < 2:
+        raise InputError(
+            "the episodes that are held out have nearly all steps, and leave none to mine from; "
+            "hold out a smaller share, or draw others by another --seed"
+        )
     return some_rows(sample, rows)
 
 

@@ -183,6 +183,18 @@ def test_one_episode_cannot_be_held_out(tmp_path: Path, mine: Mine) -> None:
         mine(folder_of(tmp_path / "logs", steps(50)), hold_out=0.5)
 
 
+def test_held_out_episodes_with_nearly_all_steps_are_refused(tmp_path: Path, mine: Mine) -> None:
+    folder = folder_of(tmp_path / "logs", steps(51))  # fifty of them in one episode
+    refused = []
+    for seed in range(8):  # until it is drawn
+        try:
+            mine(folder, hold_out=0.5, seed=seed)
+        except InputError as error:
+            refused.append(str(error))
+    assert refused
+    assert all("have nearly all steps, and leave none to mine from" in one for one in refused)
+
+
 @pytest.mark.parametrize(
     ("address", "sentence"),
     [
