@@ -7,17 +7,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import Connection, Engine, create_engine, event, inspect, text
+from sqlalchemy import Connection, Engine, create_engine, event, inspect, select, text
 from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
 from sarl_core.errors import InputError, WorkError
 from sarl_core.library.place import LibraryPlace
-from sarl_core.library.tables import NEWEST
+from sarl_core.library.tables import NEWEST, metadata, versions
 
 _PATIENCE = 30  # seconds that a writer waits for another
 _REACHED_IN = 10  # seconds, or a server counts as out of reach
 _WRITERS = 7_205_759_403  # the lock that writers of one PostgreSQL library take, one at a time
-_VERSION = "alembic_version"
 
 
 class Database:
@@ -76,7 +75,7 @@ class Database:
     def _bring_up_to_date(self) -> None:
         with self.reading() as connection:
             version = _version(connection)
-        if version == NEWEST:
+        if version == NEWEST or (version is None and self._made()):
             return
         from alembic import command
         from alembic.config import Config
@@ -95,6 +94,16 @@ class Database:
         with self.writing() as connection:
             config.attributes["connection"] = connection
             command.upgrade(config, "head")
+
+    def _made(self) -> bool:
+        """Make the tables where there are none, as all migrations together would, but sooner."""
+        with self.writing() as connection:
+            if inspect(connection).get_table_names():  # another process was first
+                return _version(connection) == NEWEST
+            metadata.create_all(connection)
+            versions.create(connection)
+            connection.execute(versions.insert().values(version_num=NEWEST))
+        return True
 
 
 def is_there(place: LibraryPlace) -> bool:
@@ -176,6 +185,6 @@ def _engine(place: LibraryPlace) -> Engine:
 
 def _version(connection: Connection) -> str | None:
     """The last step that its tables have taken; None where there are none yet."""
-    if not inspect(connection).has_table(_VERSION):
+    if not inspect(connection).has_table(versions.name):
         return None
-    return connection.execute(text(f"SELECT version_num FROM {_VERSION}")).scalar()
+    return connection.execute(select(versions.c.version_num)).scalar()

@@ -19,6 +19,9 @@ NEWEST = "0001"
 
 metadata = MetaData()
 
+versions = Table("alembic_version", MetaData(), Column("version_num", String(32), primary_key=True))
+"""Where Alembic keeps which migration was the last."""
+
 # Times are UTC, as ISO 8601 writes them with microseconds: they sort as texts, everywhere alike.
 
 items = Table(

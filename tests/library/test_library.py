@@ -283,8 +283,15 @@ def test_ids_cannot_be_guessed() -> None:
     assert {as_id(one) for one in drawn} == drawn
 
 
-def test_the_steps_lead_to_the_tables(library: Library, place: LibraryPlace) -> None:
+@pytest.mark.parametrize("by_steps", [False, True])
+def test_the_steps_lead_to_the_tables(place: LibraryPlace, by_steps: bool) -> None:
+    if place.is_folder:
+        place.folder.mkdir(parents=True, exist_ok=True)
     engine = create_engine(place.address)
+    if by_steps:  # as of a library that has taken none of them yet
+        with engine.begin() as connection:
+            tables.versions.create(connection)
+    Library(place).close()
     with engine.connect() as connection:
         context = MigrationContext.configure(connection)
         assert context.get_current_revision() == tables.NEWEST
