@@ -129,7 +129,9 @@ class Forbidding:
         forbidden, margins = self.many(states)
         rules, rows = first_of(forbidden), np.arange(len(states))
         labels = self._dimension.labels_of(values)
-        broken = forbidden[rows, labels]
+        # An environment may know labels that the rules do not: nothing forbids those.
+        known = (labels >= 0) & (labels < forbidden.shape[1])
+        broken = np.where(known, forbidden[rows, np.where(known, labels, 0)], NO_RULE)
         rows = np.flatnonzero(broken >= 0)
         rules[rows] = broken[rows]
         outside = np.zeros(len(states), dtype=np.bool_)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gymnasium.spaces import Discrete
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -126,6 +127,18 @@ def test_outside_its_data_a_rule_may_abstain():
     in_force = together.rules
     assert abstaining.freedom(state[None], in_force)[0] == 1.0
     assert acting.freedom(state[None], in_force)[0] == pytest.approx(np.log(2) / np.log(3))
+
+
+@pytest.mark.parametrize("space", [Discrete(5), Discrete(5, start=-1)])
+def test_an_action_that_the_rules_do_not_know_passes_alone_and_in_a_batch(space: Discrete):
+    shield = Shield(mine_never_rules(walk(), epsilon=0.05, supp_min=0.1)).for_space(space)
+    states = np.array([[-0.5], [0.5]], dtype=np.float32)
+    for action in set(range(int(space.start), int(space.start) + 5)) - {0, 1, 2}:
+        together = shield.decide_batch(states, [action, action])
+        assert not together.intervened.any()
+        for row, state in enumerate(states):
+            alone = shield.decide(state, action)
+            assert (alone.executed, alone.rules) == (action, (together.rules[row, 0],))
 
 
 def test_a_rule_that_is_switched_off_forbids_nothing():

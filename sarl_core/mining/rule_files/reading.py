@@ -324,7 +324,9 @@ class _Rule(DocumentPart, Generic[_Held]):
             raise MisfitError(
                 f"'forbids' and 'instead' together must be the {n_labels} labels, each once"
             )
-        return (*self.instead, self.forbids[0])[0]
+        if not self.instead:
+            raise MisfitError("a never-rule must leave one label or more: 'instead' is empty")
+        return self.instead[0]
 
 
 RuleDocument = _Rule[_HeldOut]

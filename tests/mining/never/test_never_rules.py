@@ -173,6 +173,7 @@ def test_a_never_rule_forbids_in_the_place_of_an_action():
         ({"forbids": []}, "'forbids' must be one label or more"),
         ({"forbids": [0, 0]}, "'forbids' must be one label or more"),
         ({"forbids": [7]}, "together must be the 3 labels"),
+        ({"forbids": [0, 1, 2], "instead": []}, "must leave one label or more"),
         ({"instead": [1]}, "together must be the 3 labels"),
         ({"kind": "do"}, "'action' is missing"),
         ({"kind": "do", "action": 1}, "has no 'forbids'"),
