@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
-import math
-
 from sarl_core.explaining.exports.arithmetic import assignments, derived_lines, used_operations
+from sarl_core.explaining.exports.c_never import never_parts
+from sarl_core.explaining.exports.c_text import (
+    comment,
+    finder_name,
+    floats,
+    kind_of,
+    listed,
+    number,
+    rule_comment,
+)
 from sarl_core.explaining.exports.program import (
     CodeLine,
     DimensionProgram,
@@ -18,8 +26,8 @@ from sarl_core.explaining.exports.program import (
     state_lines,
 )
 from sarl_core.explaining.words.sign_off import SignOff
-from sarl_core.mining.action_words import says_text
-from sarl_core.mining.language import conditions_text, counted, one_line
+from sarl_core.mining.action_words import label_text
+from sarl_core.mining.language import conditions_text, counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import Rule
@@ -44,7 +52,7 @@ _HEAD = """\
  *
  *   It returns 1 if an action was changed, 0 if not. An action that breaks no rule is
  *   passed on as it is. It keeps nothing between calls and may run in several threads.
- *   Where a number of the state {none}, it returns
+{never} *   Where a number of the state {none}, it returns
  *   SHIELD_INVALID, and no rule is in force: {invalid}.
  *
  * Made by `python -m sarl_core export`: {rules}{projection}.
@@ -66,6 +74,12 @@ _HEAD = """\
 _FUSED = """\
 /* Some of what is asked is derived from the state, in doubles and step by step. Compile with
  * -ffp-contract=off: fused operations give other numbers. */
+"""
+
+_NEVER = """\
+ *   Rules that forbid actions are asked where no rule demands one. The index is then that of
+ *   the rule that is broken, else of the first in force, and a forbidden action becomes the
+ *   one that the expert took most often there of those that no rule forbids.
 """
 
 _HELPERS = {
@@ -113,8 +127,9 @@ def rules_to_c(
     program = program_of(rule_set, projection, on_invalid)
     functions = [
         part
-        for index, order in enumerate(program.orders)
-        for part in _finders(index, order, program)
+        for index, orders in enumerate(zip(program.orders, program.never, strict=True))
+        for order in (orders[0], *orders[1])
+        for part in _finders(finder_name(index, order.label), order, program)
     ]
     return "\n".join(
         [
@@ -122,6 +137,7 @@ def rules_to_c(
             _names(program),
             _table(program),
             *functions,
+            *never_parts(program),
             *_derive(program),
             _valid(program),
             _decide(program),
@@ -129,29 +145,9 @@ def rules_to_c(
     )
 
 
-def comment(text: str) -> str:
-    """Text from outside for a C comment.
-
-    Args:
-        text: Any.
-
-    Returns:
-        One line that cannot end the comment, begin another or be taken for a trigraph.
-    """
-    line = one_line(text)
-    # Twice for question marks: of three, the first pass leaves two side by side.
-    for signs, harmless in (("\\", "|"), ("*/", "* /"), ("/*", "/ *"), *[("??", "? ?")] * 2):
-        line = line.replace(signs, harmless)
-    return line
-
-
-def _kind(program: Program) -> str:
-    return "float" if program.continuous else "int64_t"
-
-
 def _head(program: Program, sign_off: SignOff | None) -> str:
     rule_set = program.rule_set
-    signature = _SIGNATURE.format(kind=_kind(program)).replace("\n", "\n *   ")
+    signature = _SIGNATURE.format(kind=kind_of(program)).replace("\n", "\n *   ")
     if program.continuous:
         replaced = {
             "centre": "the middle of the rule's interval",
@@ -159,12 +155,15 @@ def _head(program: Program, sign_off: SignOff | None) -> str:
             "expert": "what the expert typically did there",
         }[program.projection]
         projection = f";\n * an action that breaks a rule becomes {replaced}"
+        if program.forbids and program.projection == "expert":
+            projection += ",\n * and one that is forbidden the middle of an interval that is not"
     else:
         projection = ""
     return _HEAD.format(
         signature=f" *   {signature};",
         features=counted(program.width, "number"),
         fused=_FUSED if program.derives else "",
+        never=_NEVER if program.forbids else "",
         actions=counted(len(program.orders), "number"),
         none="or of the action is not finite"
         if program.continuous
@@ -182,7 +181,7 @@ def _names(program: Program) -> str:
     derived = [f" *   {comment(line)}" for line in derived_lines(program.rule_set.source.features)]
     actions = [f" *   {comment(line)}" for line in action_lines(program.rule_set.actions)]
     size = len(program.rule_set.source.features)
-    prototype = _SIGNATURE.format(kind=_kind(program))
+    prototype = _SIGNATURE.format(kind=kind_of(program))
     return "\n".join(
         [
             "/* The state:",
@@ -199,6 +198,11 @@ def _names(program: Program) -> str:
                 else []
             ),
             f"    SHIELD_ACTIONS = {len(program.orders)},",
+            *(
+                [f"    SHIELD_LABELS = {program.most_labels}, /* of an action, at most */"]
+                if program.forbids
+                else []
+            ),
             f"    SHIELD_RULES = {len(program.rule_set)},",
             "    SHIELD_INVALID = -1",
             "};",
@@ -212,12 +216,14 @@ def _names(program: Program) -> str:
 def _table(program: Program) -> str:
     """What each rule makes of an action."""
     lines = [
-        "/* What each rule makes of an action: one that it allows is kept, any other is replaced."
-        " */"
+        "/* What each rule that demands an action makes of it; of rules that forbid there is 0. */"
+        if any(rule.forbids for rule in program.rule_set.rules)
+        else "/* What each rule makes of an action: one that it allows is kept, any other is"
+        " replaced. */"
     ]
     rows = [
         f"    {_row(outcome, program)},"
-        f" /* {index}: {_rule_comment(rule, program.rule_set)}{'' if rule.enabled else ', off'} */"
+        f" /* {index}: {rule_comment(rule, program.rule_set)}{'' if rule.enabled else ', off'} */"
         for index, (rule, outcome) in enumerate(
             zip(program.rule_set.rules, program.outcomes, strict=True)
         )
@@ -258,12 +264,8 @@ def _table(program: Program) -> str:
 def _row(outcome: Replacement, program: Program) -> str:
     if not program.continuous:
         return f"INT64_C({outcome.low})"
-    numbers = [outcome.low, outcome.high]
-    if outcome.value is not None:
-        numbers.insert(0, outcome.value)
-    literals = [f"(float){_number(value)}" for value in numbers]
     flags = [str(int(outcome.open_low)), str(int(outcome.open_high))]
-    return f"{{{', '.join([*literals, *flags])}}}"
+    return listed([*floats(outcome), *flags])
 
 
 def _derive(program: Program) -> list[str]:
@@ -284,42 +286,47 @@ def _derive(program: Program) -> list[str]:
     for place, feature in enumerate(features):
         if feature.derived is None:
             continue
-        steps = assignments(feature.derived, "(double)x[{}]".format, _number, functions)
+        steps = assignments(feature.derived, "(double)x[{}]".format, number, functions)
         lines.append(f"    {{ /* {comment(feature.name)} */")
         lines += [f"        double t{step} = {text};" for step, text in enumerate(steps)]
         lines += [f"        x[{place}] = (float)t{len(steps) - 1};", "    }"]
     return ["\n".join([*lines, "}", ""])]
 
 
-def _finders(index: int, order: DimensionProgram, program: Program) -> list[str]:
+def _finders(name: str, order: DimensionProgram, program: Program) -> list[str]:
     """The functions that find the rule of one action dimension, called ones first."""
     always = any(not rule.conditions for _, rule in order.scanned)
     parts = [[]] if always else parts_of(order.nodes)
+    what = (
+        "the rule in force"
+        if order.label is None
+        else f"the rule that forbids {label_text(order.label, order.dimension)}"
+    )
     finders = []
-    for number in reversed(range(len(parts))):
+    for part in reversed(range(len(parts))):
         lines = [
-            f"/* {comment(order.dimension.name)}: the rule in force. */"
-            if number == 0
+            f"/* {comment(order.dimension.name)}: {comment(what)}. */"
+            if part == 0
             else "/* Further down. */",
-            f"static int {_finder(index, number)}(const float *x)",
+            f"static int {_part(name, part)}(const float *x)",
             "{",
         ]
-        if number == 0:
+        if part == 0:
             if always or not order.asks:
                 lines.append("    (void)x;")
             lines += [line for place, rule in order.scanned for line in _scan(place, rule, program)]
-        lines += [line for step in parts[number] for line in _lines(step, index, program)]
+        lines += [line for step in parts[part] for line in _lines(step, name, program)]
         finders.append("\n".join([*lines, "}", ""]))
     return finders
 
 
-def _finder(index: int, number: int) -> str:
-    return f"shield_rule_of_{index}" + (f"_{number}" if number else "")
+def _part(name: str, number: int) -> str:
+    return f"{name}_{number}" if number else name
 
 
 def _scan(place: int, rule: Rule, program: Program) -> list[str]:
     rule_set = program.rule_set
-    text = f"return {place}; /* {_rule_comment(rule, rule_set)} */"
+    text = f"return {place}; /* {rule_comment(rule, rule_set)} */"
     if not rule.conditions:
         return [f"    {text}"]
     queries = [
@@ -336,12 +343,12 @@ def _scan(place: int, rule: Rule, program: Program) -> list[str]:
     ]
 
 
-def _lines(step: CodeLine, index: int, program: Program) -> list[str]:
+def _lines(step: CodeLine, name: str, program: Program) -> list[str]:
     space, rule_set = "    " * (step.level + 1), program.rule_set
     match step.kind:
         case "if":
-            name = comment(query_name(rule_set.source.features[step.feature]))
-            query = f"{space}if ({_query(step.feature, step.threshold)}) {{ /* {name} */"
+            statement = comment(query_name(rule_set.source.features[step.feature]))
+            query = f"{space}if ({_query(step.feature, step.threshold)}) {{ /* {statement} */"
             if step.feature not in program.formulas:
                 return [query]
             return [
@@ -354,28 +361,16 @@ def _lines(step: CodeLine, index: int, program: Program) -> list[str]:
         case "end":
             return [f"{space}}}"]
         case "part":
-            return [f"{space}return {_finder(index, step.target)}(x);"]
+            return [f"{space}return {_part(name, step.target)}(x);"]
         case "rule":
             if step.target == NO_RULE:
                 return [f"{space}return -1;"]
             rule = rule_set.rules[step.target]
-            return [f"{space}return {step.target}; /* {_rule_comment(rule, rule_set)} */"]
+            return [f"{space}return {step.target}; /* {rule_comment(rule, rule_set)} */"]
 
 
 def _query(feature: int, threshold: float, op: str = "<=") -> str:
-    return f"(double)x[{feature}] {op} {_number(threshold)}"
-
-
-def _number(value: float) -> str:
-    """A number that C reads back as the same double."""
-    if math.isinf(value):
-        return "HUGE_VAL" if value > 0 else "-HUGE_VAL"
-    return repr(float(value))
-
-
-def _rule_comment(rule: Rule, rule_set: RuleSet) -> str:
-    action = says_text(rule, rule_set.actions[rule.dimension])
-    return comment(f"{rule_set.name_of(rule)}: {action}")
+    return f"(double)x[{feature}] {op} {number(threshold)}"
 
 
 def _valid(program: Program) -> str:
@@ -397,7 +392,7 @@ def _valid(program: Program) -> str:
     return "\n".join(
         [
             *table,
-            f"static int shield_is_valid(const float *state, const {_kind(program)} *proposed)",
+            f"static int shield_is_valid(const float *state, const {kind_of(program)} *proposed)",
             "{",
             "    for (int i = 0; i < SHIELD_FEATURES; i++)",
             "        if (!isfinite(state[i]))",
@@ -413,9 +408,9 @@ def _valid(program: Program) -> str:
 
 
 def _decide(program: Program) -> str:
+    x = "x" if program.derives else "state"
     calls = [
-        f"    rule[{index}] = {_finder(index, 0)}({'x' if program.derives else 'state'});"
-        for index in range(len(program.orders))
+        f"    rule[{index}] = {finder_name(index)}({x});" for index in range(len(program.orders))
     ]
     if not program.continuous:
         keeps, becomes = "proposed[i] == shield_value[rule[i]]", "shield_value[rule[i]]"
@@ -427,9 +422,19 @@ def _decide(program: Program) -> str:
     else:
         keeps, becomes = "shield_keeps(rule[i], proposed[i])", "shield_rule[rule[i]].value"
     passes = program.on_invalid == "pass"
+    unruled = [f"        if (rule[i] < 0 || {keeps}) {{"]
+    if program.forbids:
+        unruled = [
+            "        if (rule[i] < 0) {",
+            f"            const {kind_of(program)} allowed ="
+            f" shield_allowed(i, {x}, proposed[i], &rule[i]);",
+            "            changed |= allowed != proposed[i];",
+            "            executed[i] = allowed;",
+            f"        }} else if ({keeps}) {{",
+        ]
     return "\n".join(
         [
-            _SIGNATURE.format(kind=_kind(program)),
+            _SIGNATURE.format(kind=kind_of(program)),
             "{",
             "    int changed = 0;",
             *(["    float x[SHIELD_VALUES];"] if program.derives else []),
@@ -441,7 +446,7 @@ def _decide(program: Program) -> str:
             *(["    shield_derive(state, x);"] if program.derives else []),
             *calls,
             "    for (int i = 0; i < SHIELD_ACTIONS; i++) {",
-            f"        if (rule[i] < 0 || {keeps}) {{",
+            *unruled,
             "            executed[i] = proposed[i];",
             "        } else {",
             f"            executed[i] = {becomes};",

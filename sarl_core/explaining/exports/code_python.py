@@ -19,7 +19,7 @@ from sarl_core.explaining.exports.program import (
     state_lines,
 )
 from sarl_core.explaining.words.sign_off import SignOff
-from sarl_core.mining.action_words import says_text
+from sarl_core.mining.action_words import label_text, says_text
 from sarl_core.mining.language import conditions_text, counted, one_line
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
@@ -123,12 +123,17 @@ def shield(state, action):
 
     Returns (executed, rules). An action that breaks no rule is passed on as it is. For each
     action, rules holds the index of the rule in force, or -1 where none applies.
+{never}\
     """
     x = numbers(state, FEATURES)
     if x is None or not are_labels((action,) if SINGLE else action):
 {answer}\
 {derive}\
     rules = [find(x) for find in FIND]
+{decide}\
+'''
+
+_DEMANDED = """\
     if SINGLE:
         value = VALUES[rules[0]] if rules[0] >= 0 else action
         return (action if action == value else value), rules
@@ -137,6 +142,48 @@ def shield(state, action):
         for proposed, rule in zip(action, rules)
     ]
     return executed, rules
+"""
+
+_DEMANDED_OR_ALLOWED = """\
+    executed = [action] if SINGLE else list(action)
+    for index, rule in enumerate(rules):
+        wanted = executed[index]
+        if rule < 0:
+            executed[index], rules[index] = allowed(x, index, wanted)
+        elif wanted != VALUES[rule]:
+            executed[index] = VALUES[rule]
+    return (executed[0] if SINGLE else executed), rules
+"""
+
+_NEVER_NOTE = """
+    Rules that forbid actions are asked where no rule demands one. The index is then that of the
+    rule that is broken, else of the first in force, and a forbidden action becomes the one that
+    the expert took most often there of those that no rule forbids{expert}.
+"""
+
+_ALLOWED = '''
+
+def allowed(x, index, action):
+    """What becomes of an action where no rule demands one, and the rule that it breaks.
+
+    Where it breaks none, the first rule in force or -1.
+    """
+    forbidden = {{}}
+    for label, find in FORBID[index].items():
+        rule = find(x)
+        if rule >= 0:
+            forbidden[label] = rule
+{label}\
+    if label not in forbidden:
+        return action, min(forbidden.values(), default=-1)
+    broken = forbidden[label]
+    # Where every label is forbidden, the rule of the fewest states decides.
+    closest = min(forbidden.values(), key=lambda rule: (NEVER[rule][0], rule))
+    free = [other for other in NEVER[broken][1] if other not in forbidden]
+    other = free[0] if free else NEVER[closest][1][0]
+    if other == label:
+        return action, broken
+{becomes}\
 '''
 
 _CONTINUOUS = '''
@@ -149,6 +196,7 @@ def shield(state, action):
 
     Returns (executed, rules). An action that breaks no rule is passed on as it is. For each
     action dimension, rules holds the index of the rule in force, or -1 where none applies.
+{never}\
     """
     x, proposed = numbers(state, FEATURES), numbers(action, len(FIND))
     if x is None or proposed is None:
@@ -158,6 +206,7 @@ def shield(state, action):
     executed = list(proposed)
     for index, rule in enumerate(rules):
         if rule < 0:
+{unruled}\
             continue
         value, low, high, open_low, open_high = OUTCOMES[rule]
         wanted = executed[index]
@@ -168,6 +217,36 @@ def shield(state, action):
         executed[index] = value
     return executed, rules
 '''
+
+
+_LABEL = (
+    """\
+    actions = ACTIONS[index]
+    label = actions.index(action) if action in actions else None
+""",
+    """\
+    return ACTIONS[index][other], broken
+""",
+)
+
+_INTERVAL = (
+    """\
+    intervals = INTERVALS[index]
+    label = sum(action >= low for _, low, _ in intervals[1:])
+""",
+    """\
+    value, low, high = intervals[other]
+    if value is None:  # the nearest that is allowed
+        value = min(max(action, low), high)
+    return value, broken
+""",
+)
+
+_UNRULED = """\
+            executed[index], rules[index] = allowed(x, index, executed[index])
+"""
+
+_EXPERT = " (the middle of its\n    interval)"
 
 
 def rules_to_python(
@@ -194,12 +273,14 @@ def rules_to_python(
     program = program_of(rule_set, projection, on_invalid)
     functions = [
         part
-        for index, order in enumerate(program.orders)
-        for part in _finders(index, order, program)
+        for index, orders in enumerate(zip(program.orders, program.never, strict=True))
+        for order in (orders[0], *orders[1])
+        for part in _finders(_finder(index, order.label), order, program)
     ]
     docstring, answer = _INVALID[on_invalid]
     body = _CONTINUOUS if program.continuous else _DISCRETE
-    finders = ", ".join(_finder(index, 0) for index in range(len(program.orders)))
+    finders = ", ".join(_finder(index) for index in range(len(program.orders)))
+    note = _NEVER_NOTE.format(expert=_EXPERT if program.projection == "expert" else "")
     return (
         "\n".join(
             [
@@ -211,8 +292,16 @@ def rules_to_python(
                 *_derive(program),
                 "",
                 f"FIND = ({finders},)",
+                *_never(program),
                 _NUMBERS
-                + body.format(answer=answer, derive="    derive(x)\n" if program.derives else ""),
+                + _allowed(program)
+                + body.format(
+                    answer=answer,
+                    derive="    derive(x)\n" if program.derives else "",
+                    never=note if program.forbids else "",
+                    decide=_DEMANDED_OR_ALLOWED if program.forbids else _DEMANDED,
+                    unruled=_UNRULED if program.forbids else "",
+                ),
             ]
         ).rstrip()
         + "\n"
@@ -241,15 +330,18 @@ def _table(program: Program) -> list[str]:
     """What each rule makes of an action."""
     rules = zip(program.rule_set.rules, program.outcomes, strict=True)
     rows = [
-        f"    {_row(outcome, continuous=program.continuous)},"
+        f"    {None if rule.forbids else _row(outcome, continuous=program.continuous)},"
         f"  # {index}: {_rule_comment(rule, program.rule_set)}{'' if rule.enabled else ', off'}"
         for index, (rule, outcome) in enumerate(rules)
     ]
+    forbids = any(rule.forbids for rule in program.rule_set.rules)
     if not program.continuous:
-        return ["# What each rule says to do.", "VALUES = (", *rows, ")", ""]
+        but = "; None: it forbids" if forbids else ""
+        return [f"# What each rule says to do{but}.", "VALUES = (", *rows, ")", ""]
     return [
         "# What each rule makes of an action: one from low to high is kept (and beyond, where it",
         "# is open), any other becomes the value, or the nearest where that is None.",
+        *(["# Rules that forbid have None."] if forbids else []),
         "OUTCOMES = (  # value, low, high, open_low, open_high",
         *rows,
         ")",
@@ -260,9 +352,13 @@ def _table(program: Program) -> list[str]:
 def _row(outcome: Replacement, *, continuous: bool) -> str:
     if not continuous:
         return str(int(outcome.low))
-    value = "None" if outcome.value is None else _number(outcome.value)
-    numbers = [value, _number(outcome.low), _number(outcome.high)]
-    return f"({', '.join([*numbers, str(outcome.open_low), str(outcome.open_high)])})"
+    flags = [str(outcome.open_low), str(outcome.open_high)]
+    return f"({', '.join([*_numbers(outcome), *flags])})"
+
+
+def _numbers(outcome: Replacement) -> list[str]:
+    """What an action becomes, where that is one value, and the ends of what is left."""
+    return ["None" if one is None else _number(one) for one in outcome[:3]]
 
 
 def _imported(program: Program) -> str:
@@ -296,23 +392,78 @@ def _derive(program: Program) -> list[str]:
     return ["\n".join([*lines, ""])]
 
 
-def _finders(index: int, order: DimensionProgram, program: Program) -> list[str]:
+def _finders(name: str, order: DimensionProgram, program: Program) -> list[str]:
     """The functions that find the rule of one action dimension."""
     always = any(not rule.conditions for _, rule in order.scanned)
+    what = (
+        "the rule in force"
+        if order.label is None
+        else f"the rule that forbids {label_text(order.label, order.dimension)}"
+    )
     finders = []
     for number, part in enumerate([[]] if always else parts_of(order.nodes)):
-        lines = ["", f"def {_finder(index, number)}(x):"]
+        lines = ["", f"def {_part(name, number)}(x):"]
         if number == 0:
-            lines.append(f"    # {one_line(order.dimension.name)}: the rule in force.")
+            lines.append(f"    # {one_line(order.dimension.name)}: {one_line(what)}.")
             for place, rule in order.scanned:
                 lines += _scan(place, rule, program.rule_set)
-        lines += [line for step in part for line in _lines(step, index, program)]
+        lines += [line for step in part for line in _lines(step, name, program)]
         finders.append("\n".join([*lines, ""]))
     return finders
 
 
-def _finder(index: int, number: int) -> str:
-    return f"rule_of_{index}" + (f"_{number}" if number else "")
+def _finder(index: int, label: int | None = None) -> str:
+    return f"rule_of_{index}" if label is None else f"never_{index}_{label}"
+
+
+def _part(name: str, number: int) -> str:
+    return f"{name}_{number}" if number else name
+
+
+def _never(program: Program) -> list[str]:
+    """The tables of rules that forbid; nothing where none does."""
+    if not program.forbids:
+        return []
+    rows = [
+        f"    {place}: ({rule.samples}, {rule.instead}),  # {_rule_comment(rule, program.rule_set)}"
+        for place, rule in enumerate(program.rule_set.rules)
+        if rule.forbids and rule.enabled
+    ]
+    names = [
+        ", ".join(f"{order.label}: {_finder(index, order.label)}" for order in orders)
+        for index, orders in enumerate(program.never)
+    ]
+    lines = [
+        "# For each action what finds the rule that forbids a label.",
+        f"FORBID = ({' '.join(f'{{{one}}},' for one in names)})",
+        "# Of each rule that forbids the number of states that it was learned from, and the labels",
+        "# in the place of a forbidden one, the most frequent first.",
+        "NEVER = {",
+        *rows,
+        "}",
+    ]
+    if not program.continuous:
+        actions = tuple(tuple(int(one.low) for one in labels) for labels in program.allowed)
+        return [*lines, "# The actions that labels stand for.", f"ACTIONS = {actions}"]
+    intervals = [
+        " ".join(f"({', '.join(_numbers(one))})," for one in labels) for labels in program.allowed
+    ]
+    return [
+        *lines,
+        "# What an action becomes by its new label: the value, or the nearest from low to high",
+        "# where that is None.",
+        "INTERVALS = (  # for each label value, low, high",
+        *(f"    ({one})," for one in intervals),
+        ")",
+    ]
+
+
+def _allowed(program: Program) -> str:
+    """The function that decides where rules only forbid; nothing where none does."""
+    if not program.forbids:
+        return ""
+    label, becomes = _INTERVAL if program.continuous else _LABEL
+    return _ALLOWED.format(label=label, becomes=becomes)
 
 
 def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
@@ -333,12 +484,12 @@ def _scan(place: int, rule: Rule, rule_set: RuleSet) -> list[str]:
     ]
 
 
-def _lines(step: CodeLine, index: int, program: Program) -> list[str]:
+def _lines(step: CodeLine, name: str, program: Program) -> list[str]:
     space, rule_set = "    " * (step.level + 1), program.rule_set
     match step.kind:
         case "if":
-            name = query_name(rule_set.source.features[step.feature])
-            query = f"{space}if x[{step.feature}] <= {_number(step.threshold)}:  # {name}"
+            statement = query_name(rule_set.source.features[step.feature])
+            query = f"{space}if x[{step.feature}] <= {_number(step.threshold)}:  # {statement}"
             if step.feature not in program.formulas:
                 return [query]
             return [
@@ -351,7 +502,7 @@ def _lines(step: CodeLine, index: int, program: Program) -> list[str]:
         case "end":
             return []
         case "part":
-            return [f"{space}return {_finder(index, step.target)}(x)"]
+            return [f"{space}return {_part(name, step.target)}(x)"]
         case "rule":
             if step.target == NO_RULE:
                 return [f"{space}return -1"]

@@ -7,13 +7,8 @@ float32 states exactly as the threshold itself does, so nothing is lost.
 from __future__ import annotations
 
 import json
-from bisect import bisect_left
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import (
     derived_document,
@@ -23,23 +18,17 @@ from sarl_core.demonstrations.dataset import (
 from sarl_core.demonstrations.derived import Definition
 from sarl_core.errors import WorkError
 from sarl_core.explaining.exports.arithmetic import Operand, calculations
-from sarl_core.explaining.exports.program import (
-    DimensionProgram,
-    Program,
-    largest_float32,
-    program_of,
-)
+from sarl_core.explaining.exports.onnx_graph import OperatorGraph, find
+from sarl_core.explaining.exports.onnx_never import allow
+from sarl_core.explaining.exports.program import Program, program_of
 from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
-from sarl_core.mining.rules import Rule
-from sarl_core.mining.tree import LEAF
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import OnInvalid
 
 # Versions of the operators that runtimes have known for years.
 _OPERATORS, _TREES, _FORMAT = 13, 1, 7
-_FURTHER = 10_000_000  # numbers of nodes that no rule has
 
 
 def rules_to_onnx(
@@ -77,20 +66,22 @@ def rules_to_onnx(
             "or choose another format"
         ) from error
     rule_set = program.rule_set
-    graph = _Graph(helper)
+    graph = OperatorGraph(helper)
     if program.derives:
         _derive(graph, program)
     for index, order in enumerate(program.orders):
-        _find(graph, index, order)
+        find(graph, index, order)
     outputs = [f"rule_of_{i}" for i in range(len(program.orders))]
     graph.add("Concat", outputs, "rule_found", axis=1)
     graph.add("Not", [_valid(graph, program)], "invalid")
     nothing = graph.table("no_rule", np.array([NO_RULE], dtype=np.int64))
-    graph.add("Where", ["valid", "rule_found", nothing], "rule")
-    if program.continuous:
-        _replace_continuous(graph, program)
+    if not program.forbids:
+        rules = graph.add("Where", ["valid", "rule_found", nothing], "rule")
+        _execute(graph, program, _replaced(graph, program, rules))
     else:
-        _replace_discrete(graph, program)
+        decided = allow(graph, program, "rule_found", _replaced(graph, program, "rule_found"))
+        graph.add("Where", ["valid", "rule_decided", nothing], "rule")
+        _execute(graph, program, decided)
     d, m = program.width, len(program.orders)
     kind = TensorProto.FLOAT if program.continuous else TensorProto.INT64
     info = helper.make_tensor_value_info
@@ -144,7 +135,7 @@ _DOUBLE, _FLOAT = 11, 1  # of ONNX
 _OPERATOR = {"+": "Add", "-": "Sub", "*": "Mul", "/": "Div"}
 
 
-def _derive(graph: _Graph, program: Program) -> None:
+def _derive(graph: OperatorGraph, program: Program) -> None:
     """Add what works out the derived features, in doubles: `state_values`, (B, d + k + f).
 
     Behind the d features and the k derived ones stands for each of the f formulas 1 where it has
@@ -167,7 +158,7 @@ def _derive(graph: _Graph, program: Program) -> None:
     graph.values = graph.add("Concat", [*parts, *missing], "state_values", axis=1)
 
 
-def _worked_out(graph: _Graph, definition: Definition, name: str) -> str:
+def _worked_out(graph: OperatorGraph, definition: Definition, name: str) -> str:
     """The operations of one derived feature; what the last one is called, (B, 1)."""
 
     def operand(one: Operand) -> str:
@@ -219,7 +210,7 @@ def _labels(program: Program) -> list[dict[str, str]]:
     ]
 
 
-def _valid(graph: _Graph, program: Program) -> str:
+def _valid(graph: OperatorGraph, program: Program) -> str:
     """Add what tells whether the rules can be asked at all: `valid`, (B, 1)."""
 
     def every(holds: str, name: str) -> str:
@@ -245,7 +236,7 @@ def _valid(graph: _Graph, program: Program) -> str:
     return graph.add("And", parts, "valid")
 
 
-def _execute(graph: _Graph, program: Program, decided: str) -> None:
+def _execute(graph: OperatorGraph, program: Program, decided: str) -> None:
     """Add the action to execute: what was decided, where it could be."""
     otherwise = "proposed"
     if program.on_invalid == "raise":
@@ -254,197 +245,25 @@ def _execute(graph: _Graph, program: Program, decided: str) -> None:
     graph.add("Where", ["valid", decided, otherwise], "executed")
 
 
-@dataclass
-class _Graph:
-    """Operators and tables, as they are put together.
+def _replaced(graph: OperatorGraph, program: Program, rules: str) -> str:
+    """Add what becomes of the action by the rules that demand one: `decided`, (B, m).
 
-    Attributes:
-        helper: Of the package `onnx`.
-        nodes: So far.
-        tables: By their names.
-        values: What the trees walk with.
-        columns: Of the state, in doubles, that there are already.
-        flags: Of each formula the column of `state_values` that says whether it has no value.
+    Args:
+        graph: To add to.
+        program: All rules.
+        rules: What the indices of those in force are called, (B, m).
     """
-
-    helper: Any
-    nodes: list[Any] = field(default_factory=list)
-    tables: dict[str, NDArray[Any]] = field(default_factory=dict)
-    values: str = "state"
-    columns: set[str] = field(default_factory=set)
-    flags: dict[int, int] = field(default_factory=dict)
-
-    def add(self, operator: str, inputs: Sequence[str], output: str, **options: Any) -> str:
-        """Add an operator and give the name of what it puts out."""
-        self.nodes.append(self.helper.make_node(operator, list(inputs), [output], **options))
-        return output
-
-    def table(self, name: str, values: NDArray[Any]) -> str:
-        """Add a table and give its name."""
-        self.tables[name] = values
-        return name
-
-    def trees(self, trees: _Trees, output: str) -> str:
-        """Add trees that walk with the state."""
-        return self.add(
-            "TreeEnsembleRegressor",
-            [self.values],
-            output,
-            domain="ai.onnx.ml",
-            n_targets=trees.count,
-            aggregate_function="SUM",
-            post_transform="NONE",
-            **trees.attributes(),
-        )
-
-
-class _Trees:
-    """Trees in the form of the operator: each adds a number to one column of the output."""
-
-    def __init__(self, flags: Mapping[int, int], missing: float) -> None:
-        """Take in what has to be known of formulas.
-
-        Args:
-            flags: As those of the graph.
-            missing: What a tree gives where it asks about a formula without a value.
-        """
-        self._flags, self._missing = flags, missing
-        self.count = 0
-        self.nodes_treeids: list[int] = []
-        self.nodes_nodeids: list[int] = []
-        self.nodes_featureids: list[int] = []
-        self.nodes_values: list[float] = []
-        self.nodes_modes: list[str] = []
-        self.nodes_truenodeids: list[int] = []
-        self.nodes_falsenodeids: list[int] = []
-        self.target_treeids: list[int] = []
-        self.target_nodeids: list[int] = []
-        self.target_ids: list[int] = []
-        self.target_weights: list[float] = []
-
-    def query(self, node: int, feature: int, threshold: float, below: int, above: int) -> None:
-        """A node that leads on; before one that asks about a formula stands whether it has one."""
-        if feature in self._flags:
-            further = _FURTHER + 2 * len(self.nodes_nodeids)
-            self._node(node, self._flags[feature], 0.5, "BRANCH_LEQ", further, further + 1)
-            self.leaf(further + 1, self._missing)
-            node = further
-        self._node(node, feature, float(largest_float32(threshold)), "BRANCH_LEQ", below, above)
-
-    def attributes(self) -> dict[str, Any]:
-        """What the operator takes."""
-        return {
-            name: values
-            for name, values in vars(self).items()
-            if name.startswith(("nodes_", "target_"))
-        }
-
-    def leaf(self, node: int, weight: float) -> None:
-        """A node that ends."""
-        self._node(node, 0, 0.0, "LEAF", 0, 0)
-        self.target_treeids.append(self.count)
-        self.target_nodeids.append(node)
-        self.target_ids.append(self.count)
-        self.target_weights.append(float(weight))
-
-    def end(self) -> None:
-        """The tree is complete; the next begins."""
-        first = bisect_left(self.nodes_treeids, self.count)
-        if max(self.nodes_nodeids[first:]) >= _FURTHER:
-            self._number(first, bisect_left(self.target_treeids, self.count))
-        self.count += 1
-
-    def _number(self, first: int, first_leaf: int) -> None:
-        """Number the nodes of the latest tree without gaps, in their order."""
-        numbers = {node: place for place, node in enumerate(self.nodes_nodeids[first:])}
-        for start, ids in (
-            (first, self.nodes_nodeids),
-            (first_leaf, self.target_nodeids),
-            (first, self.nodes_truenodeids),
-            (first, self.nodes_falsenodeids),
-        ):
-            ids[start:] = [numbers[node] for node in ids[start:]]
-
-    def _node(
-        self, node: int, feature: int, value: float, mode: str, below: int, above: int
-    ) -> None:
-        self.nodes_treeids.append(self.count)
-        self.nodes_nodeids.append(node)
-        self.nodes_featureids.append(feature)
-        self.nodes_values.append(float(value))
-        self.nodes_modes.append(mode)
-        self.nodes_truenodeids.append(below)
-        self.nodes_falsenodeids.append(above)
-
-
-def _find(graph: _Graph, index: int, order: DimensionProgram) -> None:
-    """Add what finds the rule of one action dimension: `rule_of_<index>`, (B, 1) int64."""
-    trees = _Trees(graph.flags, NO_RULE)
-    if len(order.nodes) == 1:  # a tree of one leaf, which some runtimes do not take
-        trees.query(0, 0, 0.0, 1, 2)
-        trees.leaf(1, order.nodes[0].rule)
-        trees.leaf(2, order.nodes[0].rule)
-    for place, node in enumerate(order.nodes if len(order.nodes) > 1 else ()):
-        if node.feature == LEAF:
-            trees.leaf(place, node.rule)
-        else:
-            trees.query(place, node.feature, node.threshold, node.left, node.right)
-    trees.end()
-    walked = graph.trees(trees, f"walked_{index}")
-    name = f"rule_of_{index}"
-    if not order.scanned:
-        graph.add("Cast", [walked], name, to=7)  # int64
-        return
-    tree = graph.add("Cast", [walked], f"tree_{index}", to=7)
-    trees = _Trees(graph.flags, 0.0)
-    for _, rule in order.scanned:
-        _chain(trees, rule)
-    applies = graph.trees(trees, f"applies_{index}")
-    # The first column with the largest number is the first rule that applies.
-    first = graph.add("ArgMax", [applies], f"first_{index}", axis=1, keepdims=1)
-    places = np.array([place for place, _ in order.scanned], dtype=np.int64)
-    scanned = graph.add("Gather", [graph.table(f"scanned_{index}", places), first], f"scan_{index}")
-    most = graph.add("ReduceMax", [applies], f"most_{index}", axes=[1], keepdims=1)
-    half = graph.table("half", np.array([0.5], dtype=np.float32))
-    some = graph.add("Greater", [most, half], f"some_{index}")
-    graph.add("Where", [some, scanned, tree], name)
-
-
-def _chain(trees: _Trees, rule: Rule) -> None:
-    """A tree that is 1 where a rule applies and 0 elsewhere."""
-    length = max(rule.length, 1)
-    if not rule.conditions:
-        trees.query(0, 0, 0.0, 1, length + 1)
-        trees.leaf(1, 1.0)
-        trees.leaf(length + 1, 1.0)
-    for depth, (feature, op, threshold) in enumerate(rule.conditions):
-        on, off = depth + 1, length + 1 + depth
-        below, above = (on, off) if op == "<=" else (off, on)
-        trees.query(depth, feature, threshold, below, above)
-        trees.leaf(off, 0.0)
-    if rule.conditions:
-        trees.leaf(length, 1.0)
-    trees.end()
-
-
-def _none_and_place(graph: _Graph) -> tuple[str, str]:
-    """Where no rule applies, and an index for the tables that is valid there too."""
     zero = graph.table("zero", np.array([0], dtype=np.int64))
-    return (
-        graph.add("Less", ["rule", zero], "none"),
-        graph.add("Max", ["rule", zero], "place"),
-    )
-
-
-def _replace_discrete(graph: _Graph, program: Program) -> None:
+    none = graph.add("Less", [rules, zero], "none")
+    place = graph.add("Max", [rules, zero], "place")  # valid where there is none, too
+    if program.continuous:
+        return _replaced_continuous(graph, program, none, place)
     values = np.array([int(outcome.low) for outcome in program.outcomes], dtype=np.int64)
-    none, place = _none_and_place(graph)
     value = graph.add("Gather", [graph.table("values", values), place], "value")
-    _execute(graph, program, graph.add("Where", [none, "proposed", value], "decided"))
+    return graph.add("Where", [none, "proposed", value], "decided")
 
 
-def _replace_continuous(graph: _Graph, program: Program) -> None:
-    none, place = _none_and_place(graph)
+def _replaced_continuous(graph: OperatorGraph, program: Program, none: str, place: str) -> str:
 
     def looked_up(name: str, kind: type[np.generic]) -> str:
         values = [getattr(outcome, name) for outcome in program.outcomes]
@@ -467,4 +286,4 @@ def _replace_continuous(graph: _Graph, program: Program) -> None:
         value = graph.add("Where", [under_high, raised, high], "value")
     else:
         value = looked_up("value", np.float32)
-    _execute(graph, program, graph.add("Where", [unchanged, "proposed", value], "decided"))
+    return graph.add("Where", [unchanged, "proposed", value], "decided")

@@ -7,7 +7,7 @@ does with a state or an action that is none is the choice that the program was m
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import Literal, NamedTuple
@@ -21,11 +21,16 @@ from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import one_line
 from sarl_core.mining.rule_order import without_idle
-from sarl_core.mining.rule_set import RuleSet, require_demands
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE, NOTHING, Numbered, RuleNode, tree_of
-from sarl_core.mining.rules import Rule
 from sarl_core.mining.tree import LEAF
-from sarl_core.shielding.projection import Projection, replacements
+from sarl_core.shielding.forbidding import never_rules
+from sarl_core.shielding.projection import (
+    Projection,
+    Replacements,
+    label_replacements,
+    replacements,
+)
 from sarl_core.shielding.shield import OnInvalid
 
 # Nested deeper than this, code goes on in a function of its own: Python ends at a hundred levels.
@@ -61,11 +66,13 @@ class DimensionProgram(NamedTuple):
         dimension: The action dimension.
         scanned: Rules that are tried one by one, first; each with its index.
         nodes: The tree that is walked where none of them applies, root first.
+        label: That which the rules forbid; None for rules that demand one.
     """
 
     dimension: LabelledDimension
     scanned: tuple[Numbered, ...]
     nodes: tuple[RuleNode, ...]
+    label: int | None = None
 
     @property
     def asks(self) -> bool:
@@ -81,8 +88,12 @@ class Program:
         rule_set: Where it comes from, without derived features that no rule asks about.
         projection: What a continuous action that breaks a rule becomes.
         on_invalid: What becomes of a step whose state is no state, or whose action is none.
-        orders: One an action dimension.
-        outcomes: One a rule, in the order of the rule set.
+        orders: One an action dimension, of the rules that demand an action.
+        outcomes: One a rule, in the order of the rule set; nothing of a never-rule.
+        never: Of each action dimension one for each label that never-rules forbid somewhere, which
+            are asked where no other rule applies.
+        allowed: Of each action dimension what a forbidden action becomes, by the label in its
+            place.
     """
 
     rule_set: RuleSet
@@ -90,6 +101,8 @@ class Program:
     on_invalid: OnInvalid
     orders: tuple[DimensionProgram, ...]
     outcomes: tuple[Replacement, ...]
+    never: tuple[tuple[DimensionProgram, ...], ...]
+    allowed: tuple[tuple[Replacement, ...], ...]
 
     @property
     def width(self) -> int:
@@ -109,6 +122,21 @@ class Program:
             for place, feature in enumerate(self.rule_set.source.features)
             if isinstance(feature.derived, Formula)
         )
+
+    @property
+    def forbids(self) -> bool:
+        """Whether a never-rule is among its rules."""
+        return any(self.never)
+
+    @property
+    def most_labels(self) -> int:
+        """Number of labels of the action dimension that has most."""
+        return max(map(len, self.allowed))
+
+    @property
+    def searches(self) -> tuple[DimensionProgram, ...]:
+        """All that may be asked of a state."""
+        return (*self.orders, *(each for labels in self.never for each in labels))
 
     @property
     def continuous(self) -> bool:
@@ -222,7 +250,6 @@ def program_of(
             demonstrated values.
     """
     require_rules(rule_set)
-    require_demands(rule_set, "code for other programs")
     if not any(rule.enabled for rule in rule_set.rules):
         raise InputError(
             "every rule of the rule set is switched off, so there is nothing to export; switch "
@@ -235,6 +262,14 @@ def program_of(
         on_invalid,
         tuple(_order(rule_set, index) for index in range(len(rule_set.actions))),
         _outcomes(rule_set, projection),
+        tuple(
+            tuple(
+                _arranged(dimension, [entry for entry in rules if label in entry[1].forbids], label)
+                for label in sorted({label for _, rule in rules for label in rule.forbids})
+            )
+            for dimension, rules in zip(rule_set.actions, never_rules(rule_set), strict=True)
+        ),
+        tuple(_allowed(dimension, projection) for dimension in rule_set.actions),
     )
 
 
@@ -293,45 +328,59 @@ def largest_float32(number: float) -> np.float32:
 
 
 def _order(rule_set: RuleSet, index: int) -> DimensionProgram:
-    """As the shield arranges them: placed rules in their order, then the tree of the others."""
+    """How the rules that demand an action are found in one dimension."""
     rules = [
         (place, rule)
         for place, rule in enumerate(rule_set.rules)
-        if rule.dimension == index and rule.enabled
+        if rule.dimension == index and rule.enabled and not rule.forbids
     ]
+    return _arranged(rule_set.actions[index], rules)
+
+
+def _arranged(
+    dimension: LabelledDimension, rules: Sequence[Numbered], label: int | None = None
+) -> DimensionProgram:
+    """As the shield arranges them: placed rules in their order, then the tree of the others."""
     placed = [entry for entry in rules if entry[1].placed]
     others = [entry for entry in rules if not entry[1].placed]
     nodes = tree_of(others)
     if nodes is None:
         placed, nodes = [*placed, *others], [NOTHING]
-    return DimensionProgram(rule_set.actions[index], tuple(placed), tuple(nodes))
+    return DimensionProgram(dimension, tuple(placed), tuple(nodes), label)
 
 
 def _outcomes(rule_set: RuleSet, projection: Projection) -> tuple[Replacement, ...]:
     actions = replacements(rule_set, projection)
-    settled = np.clip(actions.target, actions.low, actions.high)
+    nothing = Replacement(None if projection == "clip" else 0, 0, 0, False, False)
     return tuple(
-        _outcome(rule, rule_set.actions[rule.dimension], value, low, high)
-        for rule, value, low, high in zip(
-            rule_set.rules,
-            settled.tolist(),
-            actions.low.tolist(),
-            actions.high.tolist(),
-            strict=True,
-        )
+        nothing if rule.forbids else _outcome(rule.action, rule_set.actions[rule.dimension], *entry)
+        for rule, entry in zip(rule_set.rules, _settled(actions), strict=True)
     )
 
 
+def _allowed(dimension: LabelledDimension, projection: Projection) -> tuple[Replacement, ...]:
+    actions = label_replacements(dimension, projection)
+    return tuple(
+        _outcome(label, dimension, *entry) for label, entry in enumerate(_settled(actions))
+    )
+
+
+def _settled(actions: Replacements) -> Iterator[tuple[float, float, float]]:
+    """Of each rule or label what an action becomes (NaN: the nearest), least and largest."""
+    settled = np.clip(actions.target, actions.low, actions.high)
+    return zip(settled.tolist(), actions.low.tolist(), actions.high.tolist(), strict=True)
+
+
 def _outcome(
-    rule: Rule, dimension: LabelledDimension, value: float, low: float, high: float
+    label: int, dimension: LabelledDimension, value: float, low: float, high: float
 ) -> Replacement:
     if not dimension.is_interval:
-        action = dimension.actions[rule.action]  # not through floating point: it may be large
+        action = dimension.actions[label]  # not through floating point: it may be large
         return Replacement(action, action, action, open_low=False, open_high=False)
     return Replacement(
         None if np.isnan(value) else float(np.float32(value)),
         low,
         high,
-        open_low=rule.action == 0,
-        open_high=rule.action == dimension.n_labels - 1,
+        open_low=label == 0,
+        open_high=label == dimension.n_labels - 1,
     )

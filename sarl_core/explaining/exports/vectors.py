@@ -62,7 +62,8 @@ def make_vectors(
 
     The other features of a state are such that it reaches the threshold on the way to the rule; of
     thresholds on derived features as nearly as there are such states (`DerivedThresholds`).
-    Behind them come states with a number that is none or infinite, and actions that are none.
+    Behind them come states with a number that is none or infinite, and actions that are none. Where
+    rules forbid, every label is proposed in each state.
 
     Args:
         rule_set: The rules.
@@ -81,7 +82,7 @@ def make_vectors(
     typical = _typical_values(rule_set)
     derived = DerivedThresholds(rule_set.source.features, typical)
     rows = [typical]
-    for order in program.orders:
+    for order in program.searches:
         for path, feature, threshold in _queries(order):
             if feature < len(typical) and not any(one.feature >= len(typical) for one in path):
                 rows += _at(path, feature, threshold, typical, rng)
@@ -93,8 +94,14 @@ def make_vectors(
             odd[feature] = value
             rows.append(odd)
     none = _no_actions(rule_set, rng)
-    states = np.array(rows + [typical] * len(none), dtype=np.float32)
-    proposed = np.concatenate([proposed_actions(rule_set, len(rows), rng), none])
+    valid = np.array(rows, dtype=np.float32)
+    actions = proposed_actions(rule_set, len(rows), rng)
+    if program.forbids:
+        # What is done follows from the label, and not from the state alone.
+        valid = np.repeat(valid, program.most_labels, axis=0)
+        actions = _every_label(rule_set, len(valid), rng)
+    states = np.concatenate([valid, np.tile(typical, (len(none), 1))])
+    proposed = np.concatenate([actions, none])
     return decided(rule_set, projection, on_invalid, states, proposed)
 
 
@@ -139,6 +146,19 @@ def proposed_actions(
     columns = [_values(dimension) for dimension in rule_set.actions]
     kind = np.float32 if rule_set.actions[0].is_interval else np.int64
     return np.stack([rng.choice(values, count).astype(kind) for values in columns], axis=1)
+
+
+def _every_label(rule_set: RuleSet, count: int, rng: np.random.Generator) -> NDArray[Any]:
+    """Actions of one label after the other, (count, m); continuous ones as `proposed_actions`."""
+    actions = proposed_actions(rule_set, count, rng)
+    for index, dimension in enumerate(rule_set.actions):
+        values = _values(dimension)
+        labels = dimension.labels_of(values)
+        for label in range(dimension.n_labels):
+            rows = np.arange(label, count, dimension.n_labels)
+            if (labels == label).any():  # too narrow an interval holds no float32 number
+                actions[rows, index] = rng.choice(values[labels == label], len(rows))
+    return actions
 
 
 def _no_actions(rule_set: RuleSet, rng: np.random.Generator) -> NDArray[Any]:
