@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -22,8 +24,12 @@ from sarl_core import (
 )
 from sarl_core.explaining.exports.code_c import rules_to_c
 from sarl_core.explaining.exports.code_python import rules_to_python
+from sarl_core.explaining.exports.export import rules_to_csv
+from sarl_core.explaining.exports.markdown import rules_to_markdown
 from sarl_core.explaining.exports.vectors import make_vectors, proposed_actions
+from sarl_core.mining.action_words import says_label, says_text
 from sarl_core.mining.editing.rounding import merged_rules
+from sarl_core.mining.language import share_text
 from sarl_core.mining.never.never_rules import with_never_rules
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.shielding.projection import Projection
@@ -290,3 +296,28 @@ def test_names_of_what_is_forbidden_stay_names(hostile: str, tmp_path: Path) -> 
     wanted = expected(rules, "centre", vectors.states, vectors.proposed)
     agree(run_c(rules, "centre", vectors.states, vectors.proposed, tmp_path), wanted)
     agree(run_python(rules, "centre", vectors.states, vectors.proposed), wanted)
+
+
+def test_markdown_says_what_the_expert_did_and_did_not() -> None:
+    rules = forbidding("lunar_lander", conf_min=0.97)
+    document = rules_to_markdown(rules)
+    assert "They cover" not in document
+    forbid = sum(bool(rule.forbids) for rule in rules)
+    assert f"{forbid} of them forbid." in document
+    assert "| Rule | If | Then | The expert | States |" in document
+    for rule, did in ((rules[0], "did so in"), (rules[-1], "did not in")):
+        (line,) = (one for one in document.splitlines() if f"| {rules.name_of(rule)} |" in one)
+        action = says_text(rule, rules.actions[0])
+        assert f" | {action} | {did} {share_text(rule.confidence)} | {rule.samples:,} |" in line
+    probed = replace(rules, rules=(replace(rules[-1], origin="probed"),))
+    assert f"| failed after it in {share_text(rules[-1].confidence)} |" in (
+        rules_to_markdown(probed)
+    )
+
+
+def test_csv_names_what_is_forbidden() -> None:
+    rules = forbidding("lunar_lander")
+    rows = list(csv.DictReader(io.StringIO(rules_to_csv(rules))))
+    assert [row["action"] for row in rows] == [says_label(rule, rules.actions[0]) for rule in rules]
+    assert all(row["action"].startswith("never ") for row in rows)
+    assert all(f"then {row['action']}." in row["rule"] for row in rows)

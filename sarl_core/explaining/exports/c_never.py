@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from sarl_core.explaining.exports.c_text import (
+    comment,
     finder_name,
     floats,
     kind_of,
     listed,
     rule_comment,
 )
-from sarl_core.explaining.exports.program import Program
+from sarl_core.explaining.exports.program import Program, Replacement
+from sarl_core.mining.action_words import action_text
+from sarl_core.mining.labels import LabelledDimension
 
 _ALLOWED = """\
 /* What becomes of an action where no rule demands one, and the rule that it breaks, else the
@@ -80,7 +85,7 @@ def never_parts(program: Program) -> list[str]:
         "static int (*const shield_find[SHIELD_ACTIONS][SHIELD_LABELS])(const float *x) = {",
         *(f"    {one}," for one in table),
         "};",
-        "/* The labels of each action. */",
+        "/* How many labels each action has, and what they stand for. */",
         f"static const int shield_labels[SHIELD_ACTIONS] = {listed(map(len, program.allowed))};",
     ]
     if not program.continuous:
@@ -107,12 +112,22 @@ def never_parts(program: Program) -> list[str]:
             f"    float {value}low, high;",
             "} shield_label[SHIELD_ACTIONS][SHIELD_LABELS] = {",
             *(
-                f"    {listed(listed(floats(one)) for one in labels)},"
-                for labels in program.allowed
+                line
+                for order, allowed in zip(program.orders, program.allowed, strict=True)
+                for line in _interval_rows(order.dimension, allowed)
             ),
         ]
     lines += ["};", ""]
-    allowed = _ALLOWED.format(
+    function = _ALLOWED.format(
         kind=kind_of(program), further=further, becomes="".join(f"{one}\n" for one in becomes)
     )
-    return ["\n".join(lines), allowed]
+    return ["\n".join(lines), function]
+
+
+def _interval_rows(dimension: LabelledDimension, allowed: Sequence[Replacement]) -> list[str]:
+    """A line a label of one action dimension."""
+    rows = [
+        f"        {listed(floats(one))}, /* {comment(action_text(label, dimension))} */"
+        for label, one in enumerate(allowed)
+    ]
+    return ["    {", *rows, "    },"]

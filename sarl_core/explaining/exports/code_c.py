@@ -77,9 +77,9 @@ _FUSED = """\
 """
 
 _NEVER = """\
- *   Rules that forbid actions are asked where no rule demands one. The index is then that of
- *   the rule that is broken, else of the first in force, and a forbidden action becomes the
- *   one that the expert took most often there of those that no rule forbids.
+ *   Rules that forbid are asked where no rule demands an action. The index is then that of
+ *   the rule that is broken, else of the first in force, and a forbidden action becomes what
+ *   the expert did most often there of what no rule forbids.
 """
 
 _HELPERS = {
@@ -155,8 +155,9 @@ def _head(program: Program, sign_off: SignOff | None) -> str:
             "expert": "what the expert typically did there",
         }[program.projection]
         projection = f";\n * an action that breaks a rule becomes {replaced}"
-        if program.forbids and program.projection == "expert":
-            projection += ",\n * and one that is forbidden the middle of an interval that is not"
+        if program.forbids:
+            where = "the nearest value in" if program.projection == "clip" else "the middle of"
+            projection += f",\n * and a forbidden one {where} the interval in its place"
     else:
         projection = ""
     return _HEAD.format(

@@ -19,7 +19,7 @@ from sarl_core.explaining.exports.program import (
     state_lines,
 )
 from sarl_core.explaining.words.sign_off import SignOff
-from sarl_core.mining.action_words import label_text, says_text
+from sarl_core.mining.action_words import action_text, label_text, says_text
 from sarl_core.mining.language import conditions_text, counted, one_line
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rule_tree import NO_RULE
@@ -156,9 +156,9 @@ _DEMANDED_OR_ALLOWED = """\
 """
 
 _NEVER_NOTE = """
-    Rules that forbid actions are asked where no rule demands one. The index is then that of the
-    rule that is broken, else of the first in force, and a forbidden action becomes the one that
-    the expert took most often there of those that no rule forbids{expert}.
+    Rules that forbid are asked where no rule demands an action. The index is then that of the
+    rule that is broken, else of the first in force, and a forbidden action becomes what the
+    expert did most often there of what no rule forbids{expert}.
 """
 
 _ALLOWED = '''
@@ -246,7 +246,7 @@ _UNRULED = """\
             executed[index], rules[index] = allowed(x, index, executed[index])
 """
 
-_EXPERT = " (the middle of its\n    interval)"
+_EXPERT = " (the middle of that interval)"
 
 
 def rules_to_python(
@@ -280,7 +280,9 @@ def rules_to_python(
     docstring, answer = _INVALID[on_invalid]
     body = _CONTINUOUS if program.continuous else _DISCRETE
     finders = ", ".join(_finder(index) for index in range(len(program.orders)))
-    note = _NEVER_NOTE.format(expert=_EXPERT if program.projection == "expert" else "")
+    note = _NEVER_NOTE.format(
+        expert=_EXPERT if program.projection == "expert" and program.continuous else ""
+    )
     return (
         "\n".join(
             [
@@ -446,14 +448,24 @@ def _never(program: Program) -> list[str]:
         actions = tuple(tuple(int(one.low) for one in labels) for labels in program.allowed)
         return [*lines, "# The actions that labels stand for.", f"ACTIONS = {actions}"]
     intervals = [
-        " ".join(f"({', '.join(_numbers(one))})," for one in labels) for labels in program.allowed
+        line
+        for order, labels in zip(program.orders, program.allowed, strict=True)
+        for line in (
+            "    (",
+            *(
+                f"        ({', '.join(_numbers(one))}),"
+                f"  # {one_line(action_text(label, order.dimension))}"
+                for label, one in enumerate(labels)
+            ),
+            "    ),",
+        )
     ]
     return [
         *lines,
         "# What an action becomes by its new label: the value, or the nearest from low to high",
         "# where that is None.",
         "INTERVALS = (  # for each label value, low, high",
-        *(f"    ({one})," for one in intervals),
+        *intervals,
         ")",
     ]
 

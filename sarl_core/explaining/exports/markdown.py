@@ -39,7 +39,9 @@ def rules_to_markdown(rule_set: RuleSet, sign_off: SignOff | None = None) -> str
     source = rule_set.source
     # Rules that overlap or are off have counts that do not add up to a share of the states.
     summary = (
-        f"They cover {share_text(rule_set.coverage)} of the states and are right in "
+        f"{sum(rule.kind == 'never' for rule in rule_set.rules):,} of them forbid."
+        if rule_set.forbids and is_plain(rule_set)
+        else f"They cover {share_text(rule_set.coverage)} of the states and are right in "
         f"{share_text(rule_set.fidelity)} of those{regrown_text(rule_set)}."
         if is_plain(rule_set)
         else f"The set was {edits_counted(rule_set)}."
@@ -61,7 +63,8 @@ def rules_to_markdown(rule_set: RuleSet, sign_off: SignOff | None = None) -> str
             *(f"- {markdown_text(one)}" for one in formulas),
         ]
     held_out = any(rule.held_out is not None for rule in rule_set.rules)
-    headings = ["Rule", "If", "Then", "The expert did so in", "States"]
+    did = "The expert" if rule_set.forbids else "The expert did so in"
+    headings = ["Rule", "If", "Then", did, "States"]
     headings += ["Held out"] if held_out else []
     features, wording = source.features, Wording(rule_set)
     intervals = BoundsTexts(lambda one: _interval(one, features[one.feature]))
@@ -81,7 +84,7 @@ def rules_to_markdown(rule_set: RuleSet, sign_off: SignOff | None = None) -> str
                 _name(rule, rule_set),
                 conditions,
                 action,
-                *_evidence(rule, held_out=held_out),
+                *_evidence(rule, held_out=held_out, forbids=rule_set.forbids),
             ]
             lines.append(f"| {' | '.join(cells)} |")
     if any(rule.placed for rule in rule_set.rules):
@@ -105,10 +108,14 @@ def _name(rule: Rule, rule_set: RuleSet) -> str:
     return f"{name}{'' if rule.enabled else ', off'}"
 
 
-def _evidence(rule: Rule, *, held_out: bool) -> list[str]:
-    """The counts of a rule."""
+def _evidence(rule: Rule, *, held_out: bool, forbids: bool) -> list[str]:
+    """The counts of a rule; among rules that forbid with what the expert did."""
+    share = share_text(rule.confidence)
+    if forbids:
+        did = "did not in" if rule.forbids else "did so in"
+        share = f"{'failed after it in' if rule.origin == 'probed' else did} {share}"
     cells = [
-        share_text(rule.confidence) if rule.samples else "–",
+        share if rule.samples else "–",
         f"{rule.samples:,}",
     ]
     if held_out:
