@@ -95,3 +95,17 @@ def test_what_cannot_be_exported_is_one_sentence(capsys, cart_rules, tmp_path, m
         1, "export", cart_rules, "--out", tmp_path / "shield.onnx"
     )
     assert list(tmp_path.glob("shield*")) == []
+
+
+@pytest.mark.parametrize("ending", ["md", "py", "c", "onnx"])
+def test_rules_that_forbid_are_exported_with_their_vectors(run, tmp_path, ending):
+    rules, out = tmp_path / "never.json", tmp_path / f"shield.{ending}"
+    run("mine", CART, "--never", "0.1", "--support", "0.02", "--out", rules)
+    assert str(out) in run("export", rules, "--out", out)
+    with (tmp_path / f"shield.{ending}.vectors.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    proposed = {row["proposed_0"] for row in rows if row["invalid"] == "0"}
+    assert proposed == {"0", "1"}
+    assert any(row["executed_0"] not in ("", row["proposed_0"]) for row in rows)
+    if ending != "onnx":
+        assert "never push" in out.read_text()
