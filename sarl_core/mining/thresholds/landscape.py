@@ -19,13 +19,19 @@ from sarl_core.errors import InputError
 from sarl_core.mining.evidence import EpisodeCounts, EpisodeSums
 from sarl_core.mining.language import limit_text
 from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.thresholds.grids import (
+    Floats,
+    Places,
+    grid_axis,
+    places_of,
+    rectangle_sums,
+    summed,
+)
 from sarl_core.mining.tree import PolicyTree, highest_above, several_trees
 from sarl_core.notebooks import table_html
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Floats = NDArray[np.float64]
 
 # The grid of the paper's Figures 2 and 3. Written as quotients, so that 0.15 is 0.15.
 PAPER_SUPPORTS: Floats = np.arange(11) / 20
@@ -215,8 +221,8 @@ def threshold_landscape(
     )
     if not trees:
         raise InputError("there is no tree to draw a landscape of; grow the trees first")
-    supports = _axis(supports, "supports")
-    confidences = _axis(confidences, "confidences")
+    supports = grid_axis(supports, "supports")
+    confidences = grid_axis(confidences, "confidences")
     places = [
         _places(tree, supports, confidences, lift_min=lift_min, max_depth=max_depth)
         for tree in trees
@@ -264,28 +270,12 @@ def episode_sums(
     Raises:
         InputError: As `threshold_landscape`.
     """
-    supports, confidences = _axis(supports, "supports"), _axis(confidences, "confidences")
+    supports, confidences = grid_axis(supports, "supports"), grid_axis(confidences, "confidences")
     places = [
         _places(tree, supports, confidences, lift_min=lift_min, max_depth=max_depth)
         for tree in trees
     ]
     return _tried(trees, places, held_out, (len(supports), len(confidences)))
-
-
-def _axis(values: ArrayLike, name: str) -> Floats:
-    try:
-        axis = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        axis = np.zeros(0)
-    usable = axis.ndim == 1 and len(axis) > 0 and np.isfinite(axis).all()
-    if not usable or (np.diff(axis) <= 0).any():
-        raise InputError(f"the {name} of a landscape must be finite numbers in ascending order")
-    if axis[0] < 0.0 or axis[-1] > 1.0:
-        raise InputError(
-            f"the {name} of a landscape go from {axis[0]:g} to {axis[-1]:g}; "
-            "give shares from 0 to 1"
-        )
-    return axis
 
 
 class EpisodePlane(NamedTuple):
@@ -301,20 +291,6 @@ class EpisodePlane(NamedTuple):
     coverage: Floats
 
 
-class _Places(NamedTuple):
-    """Where on the grid k nodes are rules: cells of a plane that is one column wider than it.
-
-    Attributes:
-        node: Node numbers, (k,).
-        enters: Cell of the largest support from which on the node counts, (k,).
-        leaves: Cell from which on it does no longer, (k,).
-    """
-
-    node: NDArray[np.int64]
-    enters: NDArray[np.int64]
-    leaves: NDArray[np.int64]
-
-
 def _places(
     tree: PolicyTree,
     supports: Floats,
@@ -322,42 +298,26 @@ def _places(
     *,
     lift_min: float,
     max_depth: int | None,
-) -> _Places:
+) -> Places:
     rectangles = rule_rectangles(tree, lift_min=lift_min, max_depth=max_depth)
     # Row s is inside while s <= support; column c while above < c <= confidence.
     rows = np.searchsorted(supports, rectangles.support, side="right")
     first = np.searchsorted(confidences, rectangles.above, side="right")
     last = np.searchsorted(confidences, rectangles.confidence, side="right")
-    inside = (rows > 0) & (first < last)
-    row = (rows[inside] - 1) * (len(confidences) + 1)  # room for those that reach the right edge
-    return _Places(rectangles.node[inside], row + first[inside], row + last[inside])
+    return places_of(rectangles.node, rows, first, last, len(confidences))
 
 
-def _summed(planes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Sum what enters and leaves over the last two axes, (..., S, C + 1) to (..., S, C)."""
-    # Along confidence from the left; along support from the largest downwards, because every
-    # rectangle begins at support 0. In place: fresh memory is what would cost the time.
-    np.cumsum(planes, axis=-1, out=planes)
-    from_top = planes[..., ::-1, :]
-    np.cumsum(from_top, axis=-2, out=from_top)
-    return planes[..., :-1]
-
-
-def _sums(tree: PolicyTree, places: _Places, shape: tuple[int, int]) -> NDArray[np.int64]:
+def _sums(tree: PolicyTree, places: Places, shape: tuple[int, int]) -> NDArray[np.int64]:
     """Rules, queries, pairs covered and right, (4, S, C)."""
     node = places.node
     each = np.ones(len(node), dtype=np.int64)
     weights = [each, tree.depth[node], tree.samples[node], tree.correct[node]]
-    planes = np.zeros((len(weights), shape[0], shape[1] + 1), dtype=np.int64)
-    for plane, weight in zip(planes.reshape(len(weights), -1), weights, strict=True):
-        np.add.at(plane, places.enters, weight)
-        np.subtract.at(plane, places.leaves, weight)
-    return _summed(planes)
+    return rectangle_sums(places, weights, shape)
 
 
 def _tried(
     trees: Sequence[PolicyTree],
-    places: Sequence[_Places],
+    places: Sequence[Places],
     held_out: Sequence[EpisodeCounts],
     shape: tuple[int, int],
 ) -> list[EpisodePlane]:
@@ -394,7 +354,7 @@ def _tried(
 
 
 def _planes(
-    places: _Places,
+    places: Places,
     counts: EpisodeCounts,
     rows: NDArray[np.int64],
     cut_place: NDArray[np.int64],
@@ -410,7 +370,7 @@ def _planes(
     ):
         np.add.at(plane, first + places.enters[node], weight)
         np.subtract.at(plane, first + places.leaves[node], weight)
-    return _summed(planes)
+    return summed(planes)
 
 
 def _add(layer: EpisodePlane, planes: NDArray[np.int64], pairs: NDArray[np.int64]) -> None:
