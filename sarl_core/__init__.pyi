@@ -21,6 +21,8 @@ from .mining.distributed.mined_files import load_mined_data as load_mined_data
 from .mining.distributed.mined_files import save_mined_data as save_mined_data
 from .mining.distributed.mining import mine_files as mine_files
 from .mining.growing.growth import grow_policy_trees as grow_policy_trees
+from .mining.never.landscape import NeverLandscape as NeverLandscape
+from .mining.never.landscape import never_landscape as never_landscape
 from .mining.never.never_rules import mine_never_rules as mine_never_rules
 from .mining.rule_set import RuleSet as RuleSet
 from .mining.rule_set import load_rules as load_rules

@@ -448,21 +448,39 @@ def landscape(
         ),
     ] = "0:0.5:0.05",
     confidences: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--confidences",
             metavar="A:B:STEP",
             help="Minimum confidences, from A to B.",
+            show_default="0:1:0.05",
         ),
-    ] = "0:1:0.05",
+    ] = None,
+    never: Annotated[
+        str | None,
+        typer.Option(
+            "--never",
+            metavar="A:B:STEP",
+            show_default=False,
+            help="Of rules that forbid, over epsilons from A to B in the place of confidences, as "
+            "0.02:0.4:0.02; with freedom, what they leave to choose.",
+        ),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Rule count, mean length, coverage and fidelity for every pair of thresholds of a grid.
+
+    With --never, those of rules that forbid, and their freedom.
 
     Example: `python -m sarl_core landscape data/demonstrations/lunar_lander.parquet --out
     landscape.html`
     """
     terminal.check_output(out, (".json", ".csv", ".html", ".png"))
+    if never is not None and confidences is not None:
+        raise InputError(
+            "rules that forbid have an epsilon in the place of a confidence; leave out "
+            "--confidences or --never"
+        )
     with terminal.working("Drawing the landscape"):
         from sarl_core.explaining.exports.landscape import (
             landscape_document,
@@ -470,9 +488,18 @@ def landscape(
             save_landscape,
         )
         from sarl_core.mining.growing.growth import grow_policy_trees
-        from sarl_core.mining.thresholds.landscape import threshold_landscape
+        from sarl_core.mining.never.landscape import NeverLandscape, never_landscape
+        from sarl_core.mining.never.never_rules import never_thresholds
+        from sarl_core.mining.thresholds.landscape import Landscape, threshold_landscape
 
-        grid = parse_grid(supports, "--supports"), parse_grid(confidences, "--confidences")
+        rows = parse_grid(supports, "--supports")
+        columns_name, across = (
+            ("--confidences", confidences or "0:1:0.05") if never is None else ("--never", never)
+        )
+        grid = rows, parse_grid(across, columns_name)
+        if never is not None:  # refuse them before the file is read
+            never_thresholds(float(grid[1][0]))
+            never_thresholds(float(grid[1][-1]))
         if any(map(is_mined_file, files)):
             from sarl_core.mining.distributed.mined_files import load_mined_data
 
@@ -486,7 +513,9 @@ def landscape(
             recorded = with_wanted(recorded, derived, divider=divider)
             trees = grow_policy_trees(recorded, divider=divider, learner=learner)
             notes = recorded.notes
-        plane = threshold_landscape(trees, *grid)
+        plane: Landscape | NeverLandscape = (
+            threshold_landscape(trees, *grid) if never is None else never_landscape(trees, *grid)
+        )
         names = [tree.dimension.name for tree in trees]
         source = trees[0].source
         title = f"{source.env_id or path_of(files, short=True)}: {source.steps:,} steps"

@@ -324,6 +324,31 @@ def test_landscape_csv_tells_action_dimensions_apart(run, tmp_path):
     assert found == ["all"] * 4 + ["up"] * 4 + ["down"] * 4
 
 
+def test_landscape_of_rules_that_forbid_is_mining_in_its_cells(run, tmp_path):
+    path, grid = tmp_path / "landscape.json", ("--never", "0.1:0.3:0.1", "--supports", "0:0.1:0.05")
+    run("landscape", LANDER, *grid, "--out", path)
+    document = json.loads(path.read_text())
+    assert document["epsilons"] == [0.1, 0.2, 0.3]
+    assert "confidences" not in document
+    assert np.array(document["freedom"]).shape == (3, 3)
+    mine = ("mine", LANDER, "--never", 0.2, "--support", 0.05, "--out", tmp_path / "rules.json")
+    mined = json.loads(run(*mine, "--json"))
+    for layer, name in (
+        ("rule_count", "rules"),
+        ("mean_length", "mean_length"),
+        ("coverage", "coverage"),
+        ("fidelity", "fidelity"),
+        ("freedom", "freedom"),
+    ):
+        assert document[layer][1][1] == pytest.approx(mined[name], abs=1e-12), layer
+    run("landscape", LANDER, *grid, "--out", tmp_path / "landscape.csv")
+    with (tmp_path / "landscape.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 9
+    assert float(rows[4]["freedom"]) == document["freedom"][1][1]
+    assert float(rows[4]["epsilon"]) == 0.2
+
+
 def test_landscape_html_opens_without_a_network(run, tmp_path):
     path = tmp_path / "landscape.html"
     run("landscape", CART, "--out", path)

@@ -8,6 +8,8 @@ import pytest
 from sarl_core import PolicyTree, threshold_landscape
 from sarl_core.explaining.figures import thresholds as figures
 from sarl_core.explaining.figures.pareto_front import front_figure, thin_front
+from sarl_core.mining.language import share_text
+from sarl_core.mining.never.landscape import never_landscape
 from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
 from sarl_core.mining.thresholds.pareto import ParetoPoint, pareto_front
 from sarl_core.mining.thresholds.steps import FINE_CONFIDENCES, FINE_SUPPORTS
@@ -93,6 +95,21 @@ def test_one_sheet_shows_the_four_layers(paper: Landscape) -> None:
     assert titles == [style.title for style in figures.LAYERS.values()]
     assert figure.layout.xaxis4.title.text == "Minimum support"
     assert figures.landscape_figure(paper).layout.title.text is None
+
+
+def test_a_sheet_of_rules_that_forbid_shows_freedom(
+    lander_trees: tuple[PolicyTree, ...],
+) -> None:
+    landscape = never_landscape(lander_trees, [0.0, 0.05], [0.05, 0.1, 0.3])
+    figure = figures.landscape_figure(landscape)
+    titles = [note.text for note in figure.layout.annotations]
+    assert titles[-1] == "Freedom: what is left to choose"
+    cells, points = figure.data[-2:]
+    assert np.asarray(cells.z) == pytest.approx(landscape.freedom.T, abs=1e-4)
+    assert figure.layout.yaxis4.title.text == "Epsilon"
+    assert points.customdata[4][:2].tolist() == [0.05, 0.1]
+    assert points.customdata[4][6] == f", freedom {share_text(landscape.freedom[1, 1], decimals=1)}"
+    assert "epsilon %{customdata[1]}" in points.hovertemplate
 
 
 def test_a_thinned_front_is_part_of_it(lander_trees: tuple[PolicyTree, ...]) -> None:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from sarl_core.errors import InputError
 from sarl_core.files import whole_file
+from sarl_core.mining.never.landscape import NEVER_LAYERS, NeverLandscape
 from sarl_core.mining.thresholds.landscape import LAYERS, Landscape
 
 MAX_VALUES = 10_001  # an axis in steps of 0.0001
@@ -52,7 +53,7 @@ def parse_grid(text: str, name: str) -> NDArray[np.float64]:
 
 
 def save_landscape(
-    landscape: Landscape, names: Sequence[str], path: Path, *, title: str = ""
+    landscape: Landscape | NeverLandscape, names: Sequence[str], path: Path, *, title: str = ""
 ) -> None:
     """Write a landscape; the file appears whole or not at all.
 
@@ -93,7 +94,9 @@ def save_landscape(
         unfinished.write_bytes(content)
 
 
-def landscape_document(landscape: Landscape, names: Sequence[str]) -> dict[str, Any]:
+def landscape_document(
+    landscape: Landscape | NeverLandscape, names: Sequence[str]
+) -> dict[str, Any]:
     """A landscape for JSON.
 
     Args:
@@ -101,23 +104,29 @@ def landscape_document(landscape: Landscape, names: Sequence[str]) -> dict[str, 
         names: Of the action dimensions.
 
     Returns:
-        `supports`, `confidences`, the four layers as one list a support with one entry a
-        confidence (fidelity null where nothing is covered), and under `dimensions` the layers of
-        each action dimension with its `name`.
+        `supports`, `confidences` (of never-rules `epsilons`), the layers as one list a support
+        with one entry a confidence (fidelity null where nothing is covered), and under
+        `dimensions` the layers of each action dimension with its `name`.
     """
+    across = (
+        {"epsilons": landscape.epsilons.tolist()}
+        if isinstance(landscape, NeverLandscape)
+        else {"confidences": landscape.confidences.tolist()}
+    )
+    parts: Sequence[Landscape | NeverLandscape] = landscape.dimensions
     return {
         "supports": landscape.supports.tolist(),
-        "confidences": landscape.confidences.tolist(),
+        **across,
         **_layers(landscape),
         "dimensions": [
-            {"name": name, **_layers(part)}
-            for name, part in zip(names, landscape.dimensions, strict=True)
+            {"name": name, **_layers(part)} for name, part in zip(names, parts, strict=True)
         ],
     }
 
 
-def _layers(landscape: Landscape) -> dict[str, Any]:
-    layers = {layer: getattr(landscape, layer).tolist() for layer in LAYERS}
+def _layers(landscape: Landscape | NeverLandscape) -> dict[str, Any]:
+    names = NEVER_LAYERS if isinstance(landscape, NeverLandscape) else LAYERS
+    layers = {layer: getattr(landscape, layer).tolist() for layer in names}
     # NaN, the only number that is not itself, is where nothing is covered.
     layers["fidelity"] = [
         [None if value != value else value for value in row] for row in layers["fidelity"]
@@ -125,13 +134,15 @@ def _layers(landscape: Landscape) -> dict[str, Any]:
     return layers
 
 
-def _csv(landscape: Landscape, names: Sequence[str]) -> str:
+def _csv(landscape: Landscape | NeverLandscape, names: Sequence[str]) -> str:
     """One row a cell; with several action dimensions, of the whole and of each."""
     import pandas as pd
 
-    parts = [("all", landscape)]
+    parts: list[tuple[str, Landscape | NeverLandscape]] = [("all", landscape)]
     if len(names) > 1:
         parts += zip(names, landscape.dimensions, strict=True)
-    columns = ["dimension", "support", "confidence", *LAYERS]
+    never = isinstance(landscape, NeverLandscape)
+    layers = ("epsilon", *NEVER_LAYERS) if never else ("confidence", *LAYERS)
+    columns = ["dimension", "support", *layers]
     table = pd.concat(part.to_frame().assign(dimension=name)[columns] for name, part in parts)
     return table.to_csv(index=False, lineterminator="\n")

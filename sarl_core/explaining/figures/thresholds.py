@@ -18,9 +18,10 @@ from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.ticks import share_ticks
 from sarl_core.mining.language import number_text, share_text
+from sarl_core.mining.never.landscape import NeverLandscape
 from sarl_core.mining.thresholds.landscape import Landscape
 
-Layer = Literal["rule_count", "mean_length", "coverage", "fidelity", "held_out_fidelity"]
+Layer = Literal["rule_count", "mean_length", "coverage", "fidelity", "held_out_fidelity", "freedom"]
 Floats = NDArray[np.float64]
 
 
@@ -50,6 +51,13 @@ STYLES: dict[Layer, LayerStyle] = LAYERS | {
     "held_out_fidelity": LayerStyle("Held-out fidelity: the same on episodes held out", share=True)
 }
 """Those and what there is only where episodes are held out."""
+NEVER_LAYERS: dict[Layer, LayerStyle] = {
+    "rule_count": LayerStyle("Number of rules", "rules"),
+    "coverage": LayerStyle("Coverage: share of states with a rule", share=True),
+    "fidelity": LayerStyle("Fidelity: share of those with no forbidden action", share=True),
+    "freedom": LayerStyle("Freedom: what is left to choose", share=True),
+}
+"""The layers of rules that forbid."""
 
 HEIGHT = 330
 # Fixed, so that a mark laid over the figure stands where it should.
@@ -57,7 +65,9 @@ MARGIN = {"l": 58, "r": 66, "t": 8, "b": 50, "autoexpand": False}
 _TICKS = 7
 
 
-def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Figure:
+def heatmap(
+    landscape: Landscape | NeverLandscape, layer: Layer, *, dark: bool = False
+) -> go.Figure:
     """One layer of a landscape, a cell a pair of thresholds.
 
     A click on a heatmap is not reported by every host, and one on a point is: so an invisible
@@ -69,9 +79,10 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         dark: Whether it stands on dark ground.
 
     Returns:
-        Support to the right, confidence upwards.
+        Support to the right, confidence upwards; of never-rules epsilon.
     """
-    style = STYLES[layer]
+    style = (STYLES | NEVER_LAYERS)[layer]
+    across, word, title = _upwards(landscape)
     values = np.asarray(getattr(landscape, layer), dtype=np.float64)
     figure = go.Figure()
     bar = {
@@ -108,7 +119,7 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         zmax=1 if style.share else None,
     )
     columns, rows = np.meshgrid(
-        np.arange(len(landscape.supports)), np.arange(len(landscape.confidences)), indexing="ij"
+        np.arange(len(landscape.supports)), np.arange(len(across)), indexing="ij"
     )
     figure.add_scatter(
         x=columns.ravel(),
@@ -117,7 +128,7 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         marker={"size": 1, "color": "rgba(0,0,0,0)"},
         customdata=_cell_data(landscape),
         hovertemplate=(
-            "support %{customdata[0]}, confidence %{customdata[1]}<br>"
+            f"support %{{customdata[0]}}, {word} %{{customdata[1]}}<br>"
             "<b>rules %{customdata[2]:,}</b>, mean length %{customdata[3]}<br>"
             "coverage %{customdata[4]}, fidelity %{customdata[5]}%{customdata[6]}<extra></extra>"
         ),
@@ -134,8 +145,15 @@ def heatmap(landscape: Landscape, layer: Layer, *, dark: bool = False) -> go.Fig
         )
     )
     figure.update_xaxes(**_axis("Minimum support", landscape.supports))
-    figure.update_yaxes(**_axis("Minimum confidence", landscape.confidences))
+    figure.update_yaxes(**_axis(title, across))
     return figure
+
+
+def _upwards(landscape: Landscape | NeverLandscape) -> tuple[Floats, str, str]:
+    """The thresholds beside the supports, what one is called, and the title of their axis."""
+    if isinstance(landscape, NeverLandscape):
+        return landscape.epsilons, "epsilon", "Epsilon"
+    return landscape.confidences, "confidence", "Minimum confidence"
 
 
 def position(value: float, grid: ArrayLike) -> float:
@@ -248,7 +266,7 @@ def surface(
     return figure
 
 
-def landscape_figure(landscape: Landscape, *, title: str = "") -> go.Figure:
+def landscape_figure(landscape: Landscape | NeverLandscape, *, title: str = "") -> go.Figure:
     """The four layers of a landscape on one sheet, for a file.
 
     Args:
@@ -260,14 +278,15 @@ def landscape_figure(landscape: Landscape, *, title: str = "") -> go.Figure:
     """
     from plotly.subplots import make_subplots
 
+    layers = NEVER_LAYERS if isinstance(landscape, NeverLandscape) else LAYERS
     figure = make_subplots(
         rows=2,
         cols=2,
         horizontal_spacing=0.14,
         vertical_spacing=0.15,
-        subplot_titles=[style.title for style in LAYERS.values()],
+        subplot_titles=[style.title for style in layers.values()],
     )
-    for number, layer in enumerate(LAYERS):
+    for number, layer in enumerate(layers):
         row, column = divmod(number, 2)
         part = heatmap(landscape, layer)
         cells, points = part.data
@@ -295,26 +314,26 @@ def landscape_figure(landscape: Landscape, *, title: str = "") -> go.Figure:
     return figure
 
 
-def _least(landscape: Landscape) -> float:
+def _least(landscape: Landscape | NeverLandscape) -> float:
     """Where the colours of a fidelity begin, and of both where there are two, to compare them."""
     both = [landscape.fidelity]
-    if landscape.held_out_fidelity is not None:
+    if isinstance(landscape, Landscape) and landscape.held_out_fidelity is not None:
         both.append(landscape.held_out_fidelity)
     values = np.stack(both)
     return float(np.nanmin(values)) if np.isfinite(values).any() else 0.0
 
 
-def _cell_data(landscape: Landscape) -> NDArray[np.object_]:
-    """What is said of each cell, from its thresholds to what is held out; (S * C, 7)."""
+def _cell_data(landscape: Landscape | NeverLandscape) -> NDArray[np.object_]:
+    """What is said of each cell, from its thresholds to what follows the fidelity; (S * C, 7)."""
     supports = [float(value) for value in landscape.supports]
-    confidences = [float(value) for value in landscape.confidences]
+    confidences = [float(value) for value in _upwards(landscape)[0]]
     rows: list[list[Any]] = []
     layers = zip(
         landscape.rule_count.tolist(),
         landscape.mean_length.tolist(),
         landscape.coverage.tolist(),
         landscape.fidelity.tolist(),
-        _held_out_words(landscape),
+        _further_words(landscape),
         strict=True,
     )
     for support, (counts, lengths, covered, right, tried) in zip(supports, layers, strict=True):
@@ -335,8 +354,13 @@ def _cell_data(landscape: Landscape) -> NDArray[np.object_]:
     return np.array(rows, dtype=object)
 
 
-def _held_out_words(landscape: Landscape) -> list[list[str]]:
+def _further_words(landscape: Landscape | NeverLandscape) -> list[list[str]]:
     """What follows the fidelity of each cell, (S, C)."""
+    if isinstance(landscape, NeverLandscape):
+        return [
+            [f", freedom {share_text(value, decimals=1)}" for value in row]
+            for row in landscape.freedom.tolist()
+        ]
     if landscape.held_out_fidelity is None:
         return [[""] * len(landscape.confidences)] * len(landscape.supports)
     return [
