@@ -15,8 +15,9 @@ from typing import NamedTuple
 import pytest
 
 import sarl_core
-from docs.scripts import compact_table, large_page
-from sarl_core import load_demonstrations, mine_rules, with_combinations
+from docs.scripts import compact_table, freedom, large_page
+from sarl_core import load_demonstrations, mine_never_rules, mine_rules, with_combinations
+from sarl_core.mining.language import sentence
 
 from .examples import ROOT, run
 
@@ -122,6 +123,13 @@ def test_a_sentence_that_the_guide_quotes_is_one_of_the_product(page, confidence
     assert quoted in mine_rules(demonstrations, supp_min=0.005, conf_min=confidence).to_text()
 
 
+def test_the_never_rule_that_the_guide_quotes_is_one_of_the_product():
+    quoted, *_ = re.findall(r"^> (.+)$", freedom.PAGE.read_text("utf-8"), flags=re.MULTILINE)
+    demonstrations = load_demonstrations(ROOT / "data/demonstrations/lunar_lander.parquet")
+    rules = mine_never_rules(demonstrations, epsilon=0.05, supp_min=0.005)
+    assert quoted in [sentence(rule, rules) for rule in rules]
+
+
 def test_the_table_of_the_compact_sets_is_that_of_what_was_measured():
     page = compact_table.PAGE.read_text(encoding="utf-8")
     assert compact_table.with_rules(page) == page
@@ -132,6 +140,20 @@ def test_the_table_of_the_compact_sets_is_that_of_what_was_measured():
 def test_the_tables_of_large_data_are_those_of_what_was_measured():
     page = large_page.PAGE.read_text(encoding="utf-8")
     assert large_page.with_tables(page, json.loads(large_page.JSON.read_text())) == page
+
+
+def test_the_table_of_freedom_is_that_of_what_was_measured():
+    page = freedom.PAGE.read_text(encoding="utf-8")
+    assert freedom.with_table(page, json.loads(freedom.JSON.read_text())) == page
+
+
+def test_on_the_front_of_freedom_is_what_no_other_beats():
+    def point(failures, free):
+        return {"failures": failures, "freedom": free}
+
+    best = [point(1, 0.0), point(5, 0.6), point(9, 1.0)]
+    beaten = [point(2, 0.0), point(5, 0.5), point(6, 0.6), point(9, 0.9)]
+    assert freedom.front([*beaten, *best[::-1]]) == best
 
 
 def test_the_guide_is_built_and_every_link_leads_somewhere(tmp_path):
