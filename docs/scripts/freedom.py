@@ -69,7 +69,7 @@ FEATURES = {None: "", 1: ", one feature", 2: ", two features"}
 
 
 HEAD = (
-    *("rules", "at", "how many", "freedom", "failures, 95 % interval", "mean return"),
+    *("rules", "at", "freedom", "failures, 95 % interval", "mean return"),
     *("200 or more", "at the time limit"),
 )
 
@@ -208,13 +208,13 @@ def freedom_figure(points: Sequence[dict[str, Any]], *, dark: bool) -> go.Figure
                 cliponaxis=False,
             )
     figure.update_layout(
-        width=900,
-        height=520,
+        width=720,
+        height=600,
         margin={"l": 66, "r": 20, "t": 16, "b": 56},
         paper_bgcolor=ground,
         plot_bgcolor=ground,
-        font={"color": ink, "size": 13, "family": "sans-serif"},
-        legend={"x": 1.02, "y": 1, "xanchor": "left"},
+        font={"color": ink, "size": 14},
+        legend={"orientation": "h", "x": 0, "y": -0.16, "yanchor": "top"},
     )
     grid = {"gridcolor": "rgba(128,128,128,0.25)", "zeroline": False, **share_ticks(0, 1)}
     figure.update_xaxes(
@@ -249,17 +249,16 @@ def freedom_table(points: Sequence[dict[str, Any]]) -> str:
 
 
 def _row(name: str, one: dict[str, Any], *, bold: bool) -> str:
-    features = FEATURES[one.get("features")]
     at = ", ".join(
         f"{name} {one[name]:g}" for name in ("support", "confidence", "epsilon") if name in one
     )
-    between = f"{share_text(one['failure_low'])} to {share_text(one['failure_high'])}"
+    low, high = (share_text(one[end]) for end in ("failure_low", "failure_high"))
+    kind = f"{name}{FEATURES[one.get('features')]}"
     cells = [
-        f"**{name}{features}**" if bold else f"{name}{features}",
+        (f"**{kind}**" if bold else kind) + (f": {one['rules']:,}" if one["rules"] else ""),
         f"`{one['name']}`" if "name" in one else at or "–",
-        f"{one['rules']:,}",
         share_text(one["freedom"]),
-        f"{one['failures']} of {one['episodes']} ({between})",
+        f"{one['failures']} of {one['episodes']} ({low.removesuffix(' %')} to {high})",
         f"{one['mean']:,.0f}".replace("-", "−"),
         f"{one['solved']}",
         f"{one['timed_out']}",
