@@ -105,3 +105,19 @@ def test_few_rules_achieve_what_the_guide_says_of_them() -> None:
         assert middle["rules"] <= rules
         assert middle["mean"] >= mean
         assert middle["failure_high"] <= most
+
+
+def test_what_is_forbidden_keeps_a_novice_whole_and_leaves_it_most() -> None:
+    path = FOLDER / "lunar_lander_never.json"
+    rules, card = RuleSet.load(path), json.loads(card_path(path).read_text())
+    assert card["rules"] == len(rules) == card["rounds"][card["chosen_round"] - 1]["rules"]
+    failures = [one["failures"] for one in card["rounds"]]
+    assert failures.index(min(failures)) == card["chosen_round"] - 1
+    assert {rule.origin for rule in rules} == {"probed"}
+    played = rollout("LunarLander-v3", "novice", shield=Shield(rules), episodes=30, seed=70_000_000)
+    alone = rollout("LunarLander-v3", "novice", episodes=30, seed=70_000_000)
+    assert played.failed.sum() <= 8
+    assert alone.failed.sum() >= 29
+    assert played.summary()["freedom"] > 0.8
+    assert 0.08 < card["reported"]["failure_rate"] < 0.15
+    assert card["reported"]["freedom"] > 0.85

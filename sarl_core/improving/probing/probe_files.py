@@ -89,5 +89,5 @@ def _round(one: ProbeRound) -> dict[str, Any]:
         "rules": len(one.rule_set),
         "failures": int(one.played.failed.sum()),
         "mean": round(float(one.played.returns.mean()), 2),
-        "freedom": round(float(one.played.freedom.mean()), 4),
+        "freedom": round(one.freedom, 4),
     }

@@ -117,9 +117,14 @@ class ProbeRound:
     played: Episodes
 
     @property
+    def freedom(self) -> float:
+        """What its rules left the agent to choose from, mean over the steps."""
+        return float(self.played.summary()["freedom"])
+
+    @property
     def score(self) -> tuple[float, float]:
         """What it is chosen by: the fewest failures, of equals the most freedom."""
-        return -float(self.played.failed.sum()), float(self.played.freedom.mean())
+        return -float(self.played.failed.sum()), self.freedom
 
 
 @dataclass(frozen=True)
