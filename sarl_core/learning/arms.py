@@ -197,6 +197,12 @@ def check_learning(
             f"the arm {arm.name!r} learns under a shield and there are no rules for it; give "
             "a rule file, or choose an arm without a shield (none, none-replay)"
         )
+    # Where an action is forbidden several are left, and which of them is a choice of its own.
+    if arm.memory == "masked" and rules is not None and rules.forbids:
+        raise InputError(
+            f"the arm {arm.name!r} learns from what rules demand, and some of these forbid; choose "
+            "override, penalty, executed or replay"
+        )
     if rules is not None:
         from sarl_core.rollouts.player import check_environment
         from sarl_core.shielding.shield import Shield
