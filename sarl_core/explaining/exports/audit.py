@@ -156,10 +156,15 @@ def broken_rules_html(audit: AuditNumbers) -> Markup:
                 f"{row['outside']:,}",
             )
         )
+    in_force = (
+        "to which it applies; of a rule that forbids, where none demands an action"
+        if audit.rule_set.forbids
+        else "in which it was the rule in force"
+    )
     columns = (
         Column("Rule"),
         Column("It says", "w"),
-        Column("Broken", "n", "Steps that broke it, of those in which it was the rule in force"),
+        Column("Broken", "n", f"Steps that broke it, of those {in_force}"),
         Column("Obeyed", "n", "Mean over the episodes in which it applied"),
         Column("95 % interval", "n", "Over these episodes"),
         Column("Outside", "n", "Breaks in states that its data do not reach"),

@@ -34,16 +34,26 @@ def audit_tracks(audit: Audit, rows: slice) -> tuple[Track, ...]:
         rows: Of the episode, T of them.
 
     Returns:
-        For each action dimension what was done and what the rule in force says; then the breaks,
-        those outside the data of their rules, and the near misses, where there are any.
+        For each action dimension what was done and what the rule in force says, and where rules
+        forbid what it forbids: what was done, if that breaks it; then the breaks, those outside the
+        data of their rules, and the near misses, where there are any.
     """
-    says = np.array([float(rule.action) for rule in audit.rule_set] + [np.nan])
+    says, forbids = np.full((2, len(audit.rule_set) + 1), np.nan)
+    for place, rule in enumerate(audit.rule_set):
+        (forbids if rule.forbids else says)[place] = rule.label
     tracks = []
     for index, dimension in enumerate(audit.rule_set.actions):
         name = f"{dimension.name}: " if len(audit.rule_set.actions) > 1 else ""
         done = audit.labels[rows, index].astype(np.float64)
         tracks.append(Track(f"{name}done", done, dimension))
-        tracks.append(Track(f"{name}rule says", says[audit.rules[rows, index]], dimension))
+        in_force = audit.rules[rows, index]
+        kinds = {rule.kind for rule in audit.rule_set if rule.dimension == index} or {"do"}
+        if "do" in kinds:
+            tracks.append(Track(f"{name}rule says", says[in_force], dimension))
+        if "never" in kinds:
+            forbidden = forbids[in_force]
+            broken = audit.breaks[rows, index] & ~np.isnan(forbidden)
+            tracks.append(Track(f"{name}forbidden", np.where(broken, done, forbidden), dimension))
     broken = audit.is_broken[rows]
     tracks.append(Track("broken", np.where(broken, 0.0, np.nan), None))
     for called, marks, colour in (

@@ -45,7 +45,7 @@ def audit_facts(audit: AuditNumbers) -> list[tuple[str, str]]:
         (
             "breaks",
             f"{counted(audit.broken, 'step')}, {audit.breaks_per_thousand:.1f} in a thousand; a "
-            "shield would have changed these actions",
+            f"shield would have changed these actions{_save_where(audit)}",
         ),
         ("breaks a minute", _pace_text(audit)),
         ("longest run", counted(audit.longest_run, "step") + _lasting(audit)),
@@ -75,6 +75,11 @@ def audit_facts(audit: AuditNumbers) -> list[tuple[str, str]]:
             )
         )
     return facts
+
+
+def _save_where(audit: AuditNumbers) -> str:
+    """Where a shield does not change what breaks a rule."""
+    return ", unless all others were forbidden too" if audit.rule_set.forbids else ""
 
 
 def duration_text(seconds: float) -> str:
