@@ -17,7 +17,7 @@ from sarl_core.auditing.reference import LogSample, drift_of, reference_of
 from sarl_core.auditing.steps import HeldSteps, held_steps
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import require
-from sarl_core.mining.rule_set import RuleSet, require_demands
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
 
@@ -85,7 +85,6 @@ def audit(
         InputError: If the log is of other features, units, actions or labels than the rules.
     """
     require(rule_set, RuleSet, "the rules must be a RuleSet", "load one: load_rules(path)")
-    require_demands(rule_set, "the audit")
     must = "the log must be Demonstrations"
     require(log, Demonstrations, must, "load it: load_demonstrations(path)")
     shield = Shield(rule_set, projection=projection)

@@ -13,7 +13,11 @@ from numpy.typing import NDArray
 from sarl_core.arrays import make_read_only
 from sarl_core.auditing.drift import by_episode
 from sarl_core.auditing.feature_counts import beyond_counts, quarter_counts
+from sarl_core.auditing.overlap import demanded, never_applications
 from sarl_core.auditing.steps import HeldSteps
+from sarl_core.mining.rule_order import without_idle
+from sarl_core.mining.rule_set import RuleSet
+from sarl_core.shielding.boxes import Boxes
 
 Counts = NDArray[np.int64]
 Floats = NDArray[np.float64]
@@ -60,6 +64,9 @@ class Minute(NamedTuple):
 class RuleEntries(NamedTuple):
     """Rules in episodes; K entries, where one is in force at all.
 
+    A never-rule is in force wherever it applies and no rule demands an action of its dimension:
+    beside others, and also where one of those is the one that is recorded.
+
     Attributes:
         episode: Place of the episode, from 0, ascending, (K,).
         rule: Place of the rule in the set, ascending within an episode, (K,).
@@ -86,7 +93,7 @@ class LogCounts:
         broken: Steps in which some rule was broken, (E,).
         outside: Of these, those in states that the data of a broken rule do not reach, (E,).
         near: Near misses, (E,).
-        free: Action dimensions in which a shield leaves every label, added up over steps, (E,).
+        free: Freedom that a shield leaves, added up over steps and action dimensions, (E,).
         longest_run: Steps of the longest stretch of breaks, (E,).
         jumps: Where the numbers of the steps do not count up, (E,).
         missing: Steps that the numbers leave out, (E,).
@@ -96,7 +103,7 @@ class LogCounts:
         longest_gap: Seconds of the longest jump ahead, (E,); likewise.
         unruled: Steps without a rule for each action dimension, (E, m).
         features: Steps that count for drift, of each feature, (E, F).
-        boxed: Steps whose rule keeps a data box, (E,); 0 where `features` counts others.
+        boxed: Steps of rules that keep a data box, (E,); 0 where `features` counts others.
         rules: Of each rule.
         stretches: The longest stretches of breaks, at most ten, and of equal ones the first.
         minutes: The first minute with the most breaks; () without any, or where no time is known.
@@ -108,7 +115,7 @@ class LogCounts:
     broken: Counts
     outside: Counts
     near: Counts
-    free: Counts
+    free: Floats
     longest_run: Counts
     jumps: Counts
     missing: Counts
@@ -195,7 +202,7 @@ def counts_of(held: HeldSteps, quarters: Floats | None, *, before: int = 0) -> L
         broken=summed(held.is_broken),
         outside=summed(held.outside),
         near=summed(held.near >= 0),
-        free=summed(held.free),
+        free=by_episode(held.free, starts),
         longest_run=most(lengths, rows),
         jumps=summed(held.jumps != 0),
         missing=summed(np.maximum(held.jumps, 0)),
@@ -246,18 +253,44 @@ def _places(rows: Counts, starts: Counts) -> Counts:
 
 
 def _entries(held: HeldSteps) -> RuleEntries:
-    size = len(held.rule_set)
-    row, dimension = np.nonzero(held.rules >= 0)
+    rule_set, size = held.rule_set, len(held.rule_set)
+    places = np.repeat(np.arange(len(held.log.episode_starts)), held.log.episode_lengths)
+    row, dimension = np.nonzero(demanded(rule_set, held.rules))
     rule, broken = held.rules[row, dimension], held.breaks[row, dimension]
-    keys, entry = np.unique(
-        _places(row, held.log.episode_starts) * size + rule, return_inverse=True
+    parts = [_added_up(places[row] * size + rule, broken, broken & held.outside[row])]
+    if rule_set.forbids:
+        boxes, features = _data_boxes(rule_set)
+        for place, rows in never_applications(rule_set, held.observations, held.rules):
+            one = rule_set[place]
+            broken = ~one.obeyed_by(held.labels[rows, one.dimension])
+            outside = broken.copy()
+            states = held.observations[rows[broken]][:, features]
+            outside[broken] = boxes.leave_out(np.full(len(states), place), states)
+            parts.append(_added_up(places[rows] * size + place, broken, outside))
+    keys, *columns = map(np.concatenate, zip(*parts, strict=True))
+    order = np.argsort(keys)
+    episode, in_set = np.divmod(keys[order], max(size, 1))
+    return RuleEntries(episode, in_set, *(column[order] for column in columns))
+
+
+def _data_boxes(rule_set: RuleSet) -> tuple[Boxes, list[int]]:
+    """Where the data of rules lie for a shield, and in which features: derived ones if asked."""
+    used = without_idle(rule_set)
+    features = used.source.features
+    places = [at for at, one in enumerate(rule_set.source.features) if one in features]
+    return Boxes(used.rules, len(features)), places
+
+
+def _added_up(
+    keys: Counts, broken: NDArray[np.bool_], outside: NDArray[np.bool_]
+) -> tuple[Counts, Counts, Counts, Counts]:
+    """Different keys, ascending, and how many steps, breaks and breaks outside each has."""
+    each, entry = np.unique(keys, return_inverse=True)
+    applied, breaks, beyond = (
+        np.bincount(entry[chosen], minlength=len(each)).astype(np.int64)
+        for chosen in (slice(None), broken, outside)
     )
-    applied, breaks, outside = (
-        np.bincount(entry[chosen], minlength=len(keys)).astype(np.int64)
-        for chosen in (slice(None), broken, broken & held.outside[row])
-    )
-    episode, place = np.divmod(keys, max(size, 1))
-    return RuleEntries(episode, place, applied, breaks, outside)
+    return each, applied, breaks, beyond
 
 
 def _stretches(held: HeldSteps, before: int) -> tuple[Stretch, ...]:
@@ -274,10 +307,21 @@ def _stretches(held: HeldSteps, before: int) -> tuple[Stretch, ...]:
                 before + row,
                 length,
                 None if held.clock is None else float(held.clock.seconds[part].sum()),
-                tuple(np.unique(held.rules[part][held.breaks[part]]).tolist()),
+                _broken_rules(held, part),
             )
         )
     return tuple(stretches)
+
+
+def _broken_rules(held: HeldSteps, part: slice) -> tuple[int, ...]:
+    """Places of the rules that are broken in some steps, ascending."""
+    observations, rules = held.observations[part], held.rules[part]
+    broken = {*rules[held.breaks[part]].tolist()}
+    for place, rows in never_applications(held.rule_set, observations, rules):
+        rule = held.rule_set[place]
+        if not rule.obeyed_by(held.labels[part][rows, rule.dimension]).all():
+            broken.add(place)
+    return tuple(sorted(broken))
 
 
 def _minutes(

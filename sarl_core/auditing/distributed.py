@@ -47,7 +47,7 @@ from sarl_core.mining.distributed.survey import (
     columns_of_head,
     layout_of,
 )
-from sarl_core.mining.rule_set import RuleSet, require_demands
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.progress import Progress, report
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
@@ -125,7 +125,6 @@ def audit_files(
         CancelledError: If the caller wants no more.
     """
     require(rule_set, RuleSet, "the rules must be a RuleSet", "load one: load_rules(path)")
-    require_demands(rule_set, "the audit")
     require(cluster, str, "the cluster must be text", "give its address, or local:2")
     shield = Shield(rule_set, projection=projection)
     reference = None if demonstrations is None else reference_of(shield, demonstrations)
@@ -167,7 +166,6 @@ def audit_on_cluster(
         report(progress, round(share * _STEPS), _STEPS)
 
     rule_set = shield.rule_set
-    require_demands(rule_set, "the audit")
     with saying_losses():
         advance(0.0)
         parts = _parts(client, files, reading, lambda share: advance(0.1 * share))

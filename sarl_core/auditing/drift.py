@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.auditing.overlap import demanded, never_applications
 from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.rule_set import RuleSet
 
@@ -196,26 +197,34 @@ def by_episode(values: NDArray[np.generic], starts: NDArray[np.int64]) -> Floats
 
 
 def rule_counts(
-    rule_set: RuleSet, in_force: NDArray[np.int64], starts: NDArray[np.int64]
+    rule_set: RuleSet,
+    observations: NDArray[np.float32],
+    in_force: NDArray[np.int64],
+    starts: NDArray[np.int64],
 ) -> Floats:
     """In how many steps of each episode each rule is in force.
 
     Args:
-        rule_set: R rules.
+        rule_set: R rules over d features.
+        observations: As the rules see them, (N, d).
         in_force: Index of the rule, -1 for none, (N, m).
         starts: Row at which each of E episodes starts.
 
     Returns:
-        Shape (E, R + m): the rules, then for each action dimension the steps without one.
+        Shape (E, R + m): the rules, of those that forbid all steps of `never_applications`; then
+        for each action dimension the steps without one.
     """
     size, m = len(rule_set), len(rule_set.actions)
     lengths = np.diff(np.append(starts, len(in_force)))
     episode = np.repeat(np.arange(len(starts)), lengths)
     counts = np.zeros((len(starts), size + m))
+    alone = (in_force < 0) | demanded(rule_set, in_force)
     for dimension, column in enumerate(in_force.T):
         place = np.where(column < 0, size + dimension, column)
-        key = episode * (size + m) + place
+        key = (episode * (size + m) + place)[alone[:, dimension]]
         counts += np.bincount(key, minlength=counts.size).reshape(counts.shape)
+    for never, rows in never_applications(rule_set, observations, in_force):
+        counts[:, never] = np.bincount(episode[rows], minlength=len(starts))
     return counts
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.auditing.drift import Shares, by_episode
+from sarl_core.auditing.overlap import comparable, never_applications
 from sarl_core.mining.rule_set import RuleSet
 
 Counts = NDArray[np.int64]
@@ -63,7 +64,7 @@ def beyond_counts(
     in_force: NDArray[np.int64],
     starts: NDArray[np.int64],
 ) -> tuple[Counts, Counts]:
-    """Steps whose feature lies outside the middle of the data of the rule in force.
+    """Steps whose feature lies outside the middle of the data of a rule that is in force.
 
     Args:
         rule_set: R rules over d features.
@@ -73,22 +74,36 @@ def beyond_counts(
 
     Returns:
         Such steps (E, d), and all steps of rules that keep a box, (E,); a step counts once for
-        each action dimension.
+        each action dimension, and of never-rules once for each that applies. Those that are not
+        `comparable` are left out.
     """
     d = observations.shape[1]
     counts, ruled = np.zeros((len(starts), d)), np.zeros(len(starts))
     boxes = [rule.box for rule in rule_set]
-    has_box = np.array([box is not None for box in boxes] + [False])
+    compared = comparable(rule_set)
+    forbids = np.array([bool(rule.forbids) for rule in rule_set], dtype=np.bool_)
+    has_box = np.array([box is not None for box in boxes], dtype=np.bool_) & compared
     low, high = np.zeros((2, len(boxes), d))
     for place, box in enumerate(boxes):
         if box is not None:
             low[place], high[place] = box.low, box.high
+    demands_with_box = np.append(has_box & ~forbids, [False])
     for column in in_force.T:
-        known = has_box[column]
+        known = demands_with_box[column]
         ruled += by_episode(known, starts)
         rules = np.where(known, column, 0)
         for feature in range(d if len(boxes) else 0):
             values = observations[:, feature]
             out = (values < low[rules, feature]) | (values > high[rules, feature])
             counts[:, feature] += by_episode(out & known, starts)
+    lengths = np.diff(np.append(starts, len(observations)))
+    episode = np.repeat(np.arange(len(starts)), lengths)
+    for place, rows in never_applications(rule_set, observations, in_force):
+        if not has_box[place]:
+            continue
+        ruled += np.bincount(episode[rows], minlength=len(starts))
+        for feature in range(d):
+            values = observations[rows, feature]
+            out = (values < low[place, feature]) | (values > high[place, feature])
+            counts[:, feature] += np.bincount(episode[rows[out]], minlength=len(starts))
     return counts.astype(np.int64), ruled.astype(np.int64)

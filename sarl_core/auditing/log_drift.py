@@ -17,6 +17,7 @@ from sarl_core.auditing.drift import (
     rule_counts,
 )
 from sarl_core.auditing.feature_counts import Edges, numbers_and_words, quarter_counts
+from sarl_core.auditing.overlap import comparable
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.language import number_text
 from sarl_core.mining.rule_set import RuleSet
@@ -47,13 +48,18 @@ def drift_from_rules(rule_set: RuleSet, counts: LogCounts) -> Drift:
     size, episodes = len(rule_set), rule_set.source.episodes
     in_force = counts.in_force(size).astype(np.float64)
     # A rule of a person's own says nothing of how often it applied, nor one that is switched off.
-    known = [place for place, rule in enumerate(rule_set) if rule.enabled and not rule.placed]
+    mined = [place for place, rule in enumerate(rule_set) if rule.enabled and not rule.placed]
+    compared = comparable(rule_set)
+    known = [place for place in mined if compared[place]]
     expected = [rule_set[place].support for place in known]
-    if len(known) == size:
-        known += range(size, size + len(rule_set.actions))
+    if len(mined) == size:
+        # How far rules that forbid overlap, and so what they leave, is not in the file.
+        forbidding = {rule.dimension for rule in rule_set if rule.forbids}
+        free = [at for at in range(len(rule_set.actions)) if at not in forbidding]
+        known += [size + dimension for dimension in free]
         expected += [
             1.0 - sum(rule.support for rule in rule_set.of_dimension(dimension))
-            for dimension in range(len(rule_set.actions))
+            for dimension in free
         ]
     names = [_rule_names(rule_set)[place] for place in known]
     rules = against_expected(Shares(in_force[:, known], lengths), np.array(expected), episodes)
@@ -86,7 +92,7 @@ def _usual_share(rule_set: RuleSet, applied: NDArray[np.float64]) -> float:
         rule_set: R rules.
         applied: Steps in which each is in force, (R,); one or more of a rule that keeps a box.
     """
-    boxed = np.array([rule.box is not None for rule in rule_set])
+    boxed = np.array([rule.box is not None for rule in rule_set]) & comparable(rule_set)
     chance = np.array([min(_BEYOND + 2.0 / (rule.samples + 1), 1.0) for rule in rule_set])
     return float((chance * applied)[boxed].sum() / applied[boxed].sum())
 
@@ -144,7 +150,7 @@ def edges_of(
     counts = np.hstack(
         [
             quarter_counts(rule_set, observations, starts, cuts),
-            rule_counts(rule_set, in_force, starts),
+            rule_counts(rule_set, observations, in_force, starts),
         ]
     )
     lengths = demonstrations.episode_lengths.astype(np.float64)

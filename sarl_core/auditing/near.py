@@ -92,7 +92,7 @@ def near_misses(
 
     Returns:
         The first rule in the set's order that one feature is at most `NEAR` spreads away from,
-        and that says something else than what was done; -1 where there is none, (N,).
+        and that what was done does not obey; -1 where there is none, (N,).
     """
     nearest = np.full(len(observations), -1, dtype=np.int64)
     columns = np.asfortranarray(observations)
@@ -109,7 +109,7 @@ def near_misses(
             if not len(rows):
                 break
         assert rows is not None
-        rows = rows[(labels[rows, rule.dimension] != rule.action) & (nearest[rows] < 0)]
+        rows = rows[~rule.obeyed_by(labels[rows, rule.dimension]) & (nearest[rows] < 0)]
         if not len(rows):
             continue
         broken = np.zeros(len(rows), dtype=np.int64)

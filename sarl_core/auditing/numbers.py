@@ -81,7 +81,10 @@ class AuditNumbers:
 
     @cached_property
     def broken(self) -> int:
-        """Number of steps in which some rule was broken; a shield would have changed them."""
+        """Number of steps in which some rule was broken.
+
+        A shield would have changed them, save where never-rules forbid every label.
+        """
         return int(self.counts.broken.sum())
 
     @cached_property
@@ -122,7 +125,10 @@ class AuditNumbers:
 
     @cached_property
     def obeyed_by_rule(self) -> list[HeldOut]:
-        """Of each rule, the steps in which it was in force and those in which it was kept."""
+        """Of each rule, the steps in which it was in force and those in which it was kept.
+
+        As of `RuleEntries`: a never-rule is in force beside others.
+        """
         counts, entries = self.counts, self.counts.rules
         order = np.argsort(entries.rule, kind="stable")
         return EpisodeCounts(
@@ -243,7 +249,8 @@ class AuditNumbers:
         """One row a rule, in their order.
 
         Returns:
-            `name` (as "R1"), `id`, `applies` and `broken` (steps), `episodes` in which it applies,
+            `name` (as "R1"), `id`, `applies` and `broken` (steps; of a never-rule those that no
+            rule demands an action of its dimension in), `episodes` in which it applies,
             `obeyed` (the mean over these of the share in which it was kept) with `obeyed_low` and
             `obeyed_high` (95 %; NaN with too few episodes), `outside` (breaks that its data do not
             reach), `share` of the steps and `support` in the demonstrations.

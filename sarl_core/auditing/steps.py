@@ -14,8 +14,10 @@ from sarl_core.auditing import near
 from sarl_core.auditing.clock import Clock, clock_of
 from sarl_core.auditing.matching import MatchedLog
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rule_set import RuleSet, obeying_labels
 from sarl_core.shielding.shield import Shield
+
+_DIGITS = 12  # of freedom: the mean of whole numbers, multiplied again, is whole once more
 
 
 class Yardsticks(NamedTuple):
@@ -45,14 +47,16 @@ class HeldSteps:
         observations: Of the log in the rules' order, (N, d) float32.
         labels: What was done, as the rules' labels, (N, m).
         done: The same, as the rules' own actions, (N,) or (N, m).
-        rules: Index of the rule in force or -1, (N, m).
-        breaks: Where what was done is not what the rule in force says, (N, m).
+        rules: Index of the rule in force or -1, (N, m): that which demands an action, else the
+            never-rule that was broken, else the first that applies.
+        breaks: Where what was done does not obey the rule in force, (N, m).
         executed: What a shield would have executed, (N,) or (N, m).
         outside: Whether a broken rule's data do not reach the state, (N,).
         near: Index of a rule that was not in force and would have been broken, had one feature been
             at most `near.NEAR` of its spread different; -1 where there is none, and at steps that
             break a rule anyway, (N,).
-        free: In how many action dimensions a shield leaves an agent every label, (N,).
+        free: Freedom that a shield leaves an agent, added up over the action dimensions, (N,): of
+            rules that demand, how many dimensions have every label left.
         clock: When the steps were; None where no time is known.
     """
 
@@ -66,7 +70,7 @@ class HeldSteps:
     executed: NDArray[Any]
     outside: NDArray[np.bool_]
     near: NDArray[np.int64]
-    free: NDArray[np.int64]
+    free: NDArray[np.float64]
     clock: Clock | None
 
     def __post_init__(self) -> None:
@@ -128,8 +132,10 @@ def held_steps(
     """
     rule_set = shield.rule_set
     decision = shield.decide_batch(matched.observations, matched.actions)
-    says = np.array([rule.action for rule in rule_set.rules] + [-1], dtype=np.int64)
-    breaks = (decision.rules >= 0) & (matched.labels != says[decision.rules])
+    obeying = obeying_labels(rule_set)
+    # The last row is that of -1: where no rule is in force, none is broken.
+    obeying = np.vstack([obeying, np.ones(obeying.shape[1], dtype=np.bool_)])
+    breaks = ~obeying[decision.rules, matched.labels]
     looked_at = slice(-before % yardsticks.every, None, yardsticks.every)
     nearly = np.full(len(log), -1, dtype=np.int64)
     nearly[looked_at] = near.near_misses(
@@ -148,6 +154,6 @@ def held_steps(
         executed=decision.executed,
         outside=decision.outside,
         near=nearly,
-        free=np.rint(free).astype(np.int64),
+        free=np.round(free, _DIGITS),
         clock=clock_of(log, yardsticks.step_seconds),
     )

@@ -19,9 +19,11 @@ from sarl_core import (
     Shield,
     audit,
     audit_files,
+    grow_policy_trees,
     load_demonstrations,
     load_rules,
     mine_never_rules,
+    mine_rules,
     save_demonstrations,
 )
 from sarl_core.auditing import near
@@ -33,6 +35,7 @@ from sarl_core.auditing.reference import reference_of
 from sarl_core.clusters import cluster
 from sarl_core.mining.distributed import pieces
 from sarl_core.mining.distributed.pieces import Reading, parquet_paths
+from sarl_core.mining.never.never_rules import with_never_rules
 from sarl_core.progress import CancelledError
 from tests.auditing.conftest import in_files
 
@@ -210,11 +213,25 @@ def test_logs_without_a_step(
         held_far(client, fleet_rules, in_files(loose, tmp_path / "loose", [2_000]))
 
 
-def test_rules_that_forbid_are_refused_before_anything_is_read(client: Any) -> None:
-    whole = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
-    rules = mine_never_rules(whole, epsilon=0.3, supp_min=0.02)
+@pytest.mark.parametrize("compared", [False, True])
+@pytest.mark.parametrize("behind", [False, True])
+def test_rules_that_forbid(
+    fleet: pd.DataFrame, client: Any, tmp_path: Path, behind: bool, compared: bool
+) -> None:
+    folder = in_files(fleet, tmp_path / "logs", [300, 301, 2_000])
+    whole = load_demonstrations(folder, missing="drop")
+    trees = grow_policy_trees(whole.select(range(12)))
+    rules = mine_never_rules(trees, epsilon=0.3, supp_min=0.02)
+    if behind:
+        demanding = mine_rules(trees, supp_min=0.2, conf_min=0.8)
+        rules = with_never_rules(demanding, trees, 0.3)
+        assert demanding.rules
     assert rules.forbids
-    with pytest.raises(InputError, match="the audit understands rules that demand an action"):
-        audit_files(rules, "no/such/folder", "local:2")
-    with pytest.raises(InputError, match="the audit understands rules that demand an action"):
-        audit_on_cluster(client, Shield(rules), [Path("no/such/file")], Reading())
+    before = whole.select(range(0, 40, 3)) if compared else None
+    reference = None if before is None else reference_of(Shield(rules), before)
+    near_by = audit(rules, whole, demonstrations=before)
+    assert near_by.broken > 100
+    assert near_by.near_count > 20
+    far = held_far(client, rules, folder, reference=reference)
+    assert document(far) == document(near_by)
+    assert LogComparison(far, far).to_dict() == LogComparison(near_by, near_by).to_dict()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from sarl_core import RuleSet
@@ -78,6 +79,28 @@ def test_what_cannot_be_mined_is_one_sentence(typed, tmp_path, options, said):
     assert said in error
     assert error.count("\n") == 1
     assert not out.exists()
+
+
+@pytest.mark.parametrize("options", [("--support", "0.002"), ("--setting", "filtered")])
+def test_they_are_held_against_a_log(typed, tmp_path, options):
+    out, folder = tmp_path / "never.json", tmp_path / "audited"
+    assert typed("mine", LANDER, *options, "--never", "0.1", "--out", str(out))[0] == 0
+    code, told, _ = typed("audit", str(out), LANDER, "--out", str(folder), "--json")
+    assert code == 0
+    document = json.loads(told)
+    rules = RuleSet.load(out)
+    alone = all(rule.forbids for rule in rules)
+    for rule, row in zip(rules, document["rules"], strict=True):
+        if alone or not rule.forbids:
+            assert (row["applies"], row["applies"] - row["broken"]) == (rule.samples, rule.correct)
+        else:
+            assert row["applies"] <= rule.samples
+    assert document["drift"]["drifted"] == 0
+    assert json.loads((folder / "audit.json").read_text()) == document
+    assert "then never fire left engine" in (folder / "audit.html").read_text()
+    steps = pd.read_csv(folder / "steps.csv")
+    assert steps["broken"].sum() == document["broken"] > 0
+    assert len(pd.read_csv(folder / "rules.csv")) == len(rules)
 
 
 @pytest.mark.parametrize("command", ["report", "diff", "ablate"])
