@@ -24,6 +24,7 @@ from sarl_core import (
 from sarl_core.auditing.near import NEAR, sample_keys, spreads_of
 from sarl_core.explaining.exports.audit import audit_html
 from sarl_core.explaining.figures.audit import audit_tracks, step_texts
+from sarl_core.explaining.words.audit import drift_text
 from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.never.never_rules import with_never_rules
@@ -296,6 +297,7 @@ def test_what_follows_from_probes_says_nothing_of_how_often_it_applies(
     probed = replace(rules, rules=tuple(replace(rule, origin="probed") for rule in rules))
     drift = audit(probed, lander_like).drift
     assert drift.all == ()
+    assert "cannot be said: nothing that these rules say of them" in drift_text(drift)
     beside = audit(probed, lander_like, demonstrations=lander_like).drift
     assert len(beside.rules) == len(rules) + 1
 

@@ -154,6 +154,12 @@ def drift_text(drift: Drift) -> str:
             f"({drift.episodes[0]} in the log, {drift.episodes[1]} in the demonstrations; it takes "
             f"{FEWEST_EPISODES} of each)."
         )
+    if not drift.all:
+        return (
+            "Whether the log looks like the demonstrations cannot be said: nothing that these "
+            "rules say of them can be compared with a log. Compare it with the demonstrations "
+            "themselves (--demonstrations)."
+        )
     compared = counted(len(drift.all), "share")
     sure = (
         f"{compared} compared with {drift.against}, over episodes, with intervals that hold "
