@@ -41,6 +41,8 @@ GLOSSARY = {
     "fidelity": "share of the covered states in which the expert did what the rule says",
     "never-rule": "a rule that forbids an action and leaves all others: what the expert does at "
     "most rarely in states like these, or what it does not recover from",
+    "epsilon": "of never-rules: the most that the share of a forbidden action may be, by its upper "
+    "95 % bound",
     "probe": "an episode played again up to some state, where an action is done for a while before "
     "the expert has the controls; whether it fails then says what must not be done there",
     "freedom": "what the shield leaves to the agent: 100 % where no rule applies, 0 % where "
