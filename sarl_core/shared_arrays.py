@@ -30,15 +30,25 @@ def handed_over(array: NDArray[Any]) -> Any:
     Returns:
         A function and its arguments, which give the array again.
     """
-    if array.nbytes >= _LEAST and not array.flags.writeable and not array.dtype.hasobject:
+    if array.nbytes >= _LEAST and _is_fixed(array) and not array.dtype.hasobject:
         with suppress(OSError):  # no room for a file: then as all others
             return _opened, (_file_of(array),)
     return array.__reduce_ex__(pickle.HIGHEST_PROTOCOL)
 
 
+def _is_fixed(array: Any) -> bool:
+    """Whether nobody can change an array, nor what it is a view of."""
+    while isinstance(array, np.ndarray):
+        if array.flags.writeable:
+            return False
+        array = array.base
+    return True
+
+
 def _file_of(array: NDArray[Any]) -> Path:
     with _LOCK:
-        if id(array) not in _FILES:
+        if id(array) not in _FILES or not _FILES[id(array)].exists():
+            known = id(array) in _FILES
             handle, name = tempfile.mkstemp(suffix=".npy")
             path = Path(name)
             try:
@@ -48,7 +58,8 @@ def _file_of(array: NDArray[Any]) -> Path:
                 path.unlink()
                 raise
             _FILES[id(array)] = path
-            weakref.finalize(array, _remove, id(array))
+            if not known:
+                weakref.finalize(array, _remove, id(array))
         return _FILES[id(array)]
 
 

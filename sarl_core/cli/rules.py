@@ -177,6 +177,8 @@ def mine(
     forbids_alone = never is not None and given in ([True, False, False], [False, False, False])
     if not demands and not forbids_alone:
         raise InputError("give both --support and --confidence, or --setting instead of them")
+    if forbids_alone and lift:
+        raise InputError("--lift is for rules that demand an action; leave it out")
     if lower_bound and hold_out is None:
         raise InputError(
             "--lower-bound asks what episodes say that a rule was not mined from, and none is held "

@@ -280,7 +280,14 @@ class Shield:
             margin = min(margin, near)
             if changed == value:
                 return Decision(handed, action, (rule,), False, margin, outside)
-            executed = changed if type(handed) is int else np.full_like(handed, changed)[()]
+            kind = type(handed)
+            executed = (
+                self._scalar(changed)
+                if kind is self._scalar
+                else changed
+                if kind is int
+                else np.full_like(handed, changed)
+            )
             return Decision(executed, action, (rule,), True, margin, outside)
         if value == self._wanted[rule]:
             return Decision(handed, action, (rule,), False, margin)
@@ -546,7 +553,7 @@ class Shield:
             if action.n_labels == 1:  # there was nothing to choose from
                 free[:, dimension] = 1.0
             elif forbidding is not None:
-                rows = np.flatnonzero(~demands[column])
+                rows = np.flatnonzero((column >= 0) & ~demands[column])
                 free[rows, dimension] = forbidding.freedom(np.ascontiguousarray(observations[rows]))
         return np.asarray(free.mean(axis=1))
 

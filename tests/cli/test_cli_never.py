@@ -68,6 +68,7 @@ def test_what_is_left_to_an_agent_is_told(typed, tmp_path):
         (("--never", "1"), "above 0 and below 1"),
         (("--never", "0.1", "--confidence", "0.9"), "give both --support and --confidence"),
         (("--never", "0.1", "--hold-out", "0.2"), "--hold-out is for rules that demand"),
+        (("--never", "0.1", "--lift", "3"), "--lift is for rules that demand"),
         (("--never", "0.1", "--cross-fit"), "--cross-fit is for rules that demand"),
         (("--never", "0.1", "--cluster", "local:2"), "--cluster, or a .mined file, is for rules"),
     ],

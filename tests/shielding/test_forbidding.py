@@ -141,6 +141,24 @@ def test_an_action_that_the_rules_do_not_know_passes_alone_and_in_a_batch(space:
             assert (alone.executed, alone.rules) == (action, (together.rules[row, 0],))
 
 
+def test_where_no_rule_is_asked_everything_is_left():
+    shield = Shield(mine_never_rules(walk(), epsilon=0.05, supp_min=0.1), on_invalid="pass")
+    states = np.array([[np.inf], [np.nan], [-0.5], [-0.5]], dtype=np.float32)
+    together = shield.decide_batch(states, [0, 0, 99, 1])
+    assert (together.rules[:3] == -1).all()
+    freedom = shield.freedom(states, together.rules)
+    assert freedom[:3].tolist() == [1.0] * 3
+    assert freedom[3] == pytest.approx(np.log(2) / np.log(3))
+
+
+def test_what_comes_instead_is_of_the_kind_that_was_proposed():
+    shield = Shield(mine_never_rules(walk(), epsilon=0.05, supp_min=0.1))
+    state = np.array([-0.5], dtype=np.float32)
+    executed = shield.decide(state, np.array(0)).executed
+    assert isinstance(executed, np.ndarray)
+    assert executed.shape == ()
+
+
 def test_a_rule_that_is_switched_off_forbids_nothing():
     rules = mine_never_rules(walk(), epsilon=0.05, supp_min=0.1)
     off = replace(rules, rules=tuple(replace(rule, enabled=False) for rule in rules))

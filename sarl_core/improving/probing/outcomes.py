@@ -191,7 +191,7 @@ def probed(
     one = np.array([seed], dtype=np.int64)
     table = run_seeds(env_id, player, shield, one, max_steps=max_steps).steps
     assert table is not None
-    wanted = ask(expert, table.observation, table.episode)
+    wanted = ask(expert, table.observation, np.full(len(table), seed))
     generator = np.random.default_rng((seed, 2))
     rows = np.sort(generator.choice(len(table), min(states, len(table)), replace=False))
 

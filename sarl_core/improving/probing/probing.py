@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.environments.failures import failure_known, no_failures_text
-from sarl_core.errors import InputError, require_whole
+from sarl_core.errors import InputError, require, require_whole
 from sarl_core.improving.probing.outcomes import Outcomes, probed
 from sarl_core.improving.probing.probe_rules import probe_rules
 from sarl_core.improving.questions import answered
@@ -34,7 +35,7 @@ from sarl_core.rollouts.episodes import Episodes, rollout
 from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
-_FEWEST = 2  # states, of which anything can be learned
+_FEWEST = 15  # states: a share of fewer is none
 _IN_TURNS = 4  # of so many episodes one is played in turns with the expert, in later rounds too
 
 
@@ -90,11 +91,14 @@ class ProbePlan:
             ("max_steps", 1 if self.max_steps is None else self.max_steps, 1),
         ):
             require_whole(name, value, least)
+        require(self.risk, Real, "the risk must be a number", "give a share, as 0.2")
         if not 0.0 < self.risk < 1.0:
             raise InputError(f"the risk is {self.risk}; give a share above 0 and below 1, as 0.2")
         for name, value, most in (
             ("episodes", self.episodes, seeds.MOST_EPISODES_A_ROUND),
             ("rounds", self.rounds, seeds.MOST_ROUNDS),
+            ("validation episodes", self.validation, seeds.MOST_VALIDATION),
+            ("report episodes", self.report, seeds.MOST_VALIDATION),
         ):
             if value > most:
                 raise InputError(f"there are {value:,} {name}; give at most {most:,}")

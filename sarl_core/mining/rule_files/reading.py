@@ -193,7 +193,7 @@ class _Thresholds(DocumentPart):
     confidence: Share
     lift: NotNegative = 0.0
     max_depth: Count | None = None
-    never: Share | None = None
+    never: Annotated[float, Meta(gt=0.0, lt=1.0)] | None = None
 
 
 class _Demonstrations(DocumentPart):

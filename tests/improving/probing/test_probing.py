@@ -141,8 +141,9 @@ def test_a_shield_of_them_never_lets_one_fall(probing, tmp_path):
 
 
 def test_the_same_for_any_number_of_processes():
-    plan = ProbePlan(rounds=1, episodes=6, validation=4, report=4, leaves=4, states=4)
+    plan = ProbePlan(rounds=1, episodes=24, validation=4, report=4, leaves=4, states=4)
     one, two = (probe("CartPole-v1", plan, jobs=jobs) for jobs in (1, 2))
+    assert any(rule.conditions for rule in one.rule_set)
     assert one.rule_set.digest == two.rule_set.digest
     assert (one.reported.returns == two.reported.returns).all()
 
@@ -202,6 +203,9 @@ def test_actions_without_bounds_are_refused():
         ({"leaves": 1}, "leaves"),
         ({"steps": 0}, "steps"),
         ({"episodes": 10**6}, "at most 10,000"),
+        ({"validation": 25_000_000}, "at most 500,000"),
+        ({"report": 25_000_000}, "at most 500,000"),
+        ({"risk": "much"}, "the risk must be a number"),
     ],
 )
 def test_a_plan_that_cannot_be_is_refused(wrong, said):
