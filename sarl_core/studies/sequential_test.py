@@ -158,8 +158,8 @@ def sequential_test(
     what = f"a rate of {p:g} at a certainty of {c:g}"
     if least > MOST_CERTIFIED:
         raise InputError(
-            f"{what} takes {least:,} episodes without any failure, more than {MOST_CERTIFIED:,}; "
-            "give a larger rate"
+            f"{what} takes more than {MOST_CERTIFIED:,} episodes without any failure; give a "
+            "larger rate"
         )
     usable = min(max(round(MOST_EXPECTED / p), _USUAL * least), MOST_CERTIFIED)
     wanted = min(_USUAL * least, usable) if episodes is None else episodes
@@ -221,8 +221,9 @@ def _share(name: str, value: float) -> float:
 
 
 def _first_look(p: float, error: float) -> int:
-    """After how many episodes no failure at all certifies."""
-    return math.ceil(math.log(error * (1.0 - _RESERVE * p)) / math.log1p(-p))
+    """After how many episodes no failure at all certifies; of more than can be, one too many."""
+    exact = math.log(error * (1.0 - _RESERVE * p)) / math.log1p(-p)
+    return math.ceil(min(exact, MOST_CERTIFIED + 1.0))
 
 
 def _certifying(p: float, error: float, episodes: int, most: int) -> tuple[int, ...]:
