@@ -30,6 +30,7 @@ from sarl_core.cli.options import (
     MissingName,
     Normalise,
     ProjectionName,
+    ReportEpisodes,
     Seed,
     out_option,
     with_columns,
@@ -131,13 +132,7 @@ def aggregate(
     validation: Annotated[
         int, typer.Option("--validation", help="Episodes by which the best is chosen.")
     ] = 256,
-    report: Annotated[
-        int,
-        typer.Option(
-            "--report-episodes",
-            help="Fresh episodes, which nothing was chosen by, to report the best on.",
-        ),
-    ] = 100,
+    report: ReportEpisodes = 100,
     choose: ChoiceName = "return",
     seed: Seed = 0,
     max_steps: MaxSteps = None,

@@ -127,6 +127,13 @@ ChoiceName = Annotated[
         "failures and among equals the highest mean return. It is reported on other episodes.",
     ),
 ]
+ReportEpisodes = Annotated[
+    int,
+    typer.Option(
+        "--report-episodes",
+        help="Fresh episodes, which nothing was chosen by, to report the best on.",
+    ),
+]
 Divider = Annotated[
     int,
     typer.Option(

@@ -17,6 +17,7 @@ from sarl_core.cli.options import (
     Json,
     MaxSteps,
     Normalise,
+    ReportEpisodes,
     Seed,
     out_option,
     with_played_environment,
@@ -75,13 +76,7 @@ def probe(
     validation: Annotated[
         int, typer.Option("--validation", help="Episodes by which the best round is chosen.")
     ] = 200,
-    report: Annotated[
-        int,
-        typer.Option(
-            "--report-episodes",
-            help="Fresh episodes, which nothing was chosen by, to report the best on.",
-        ),
-    ] = 1_000,
+    report: ReportEpisodes = 1_000,
     seed: Seed = 0,
     max_steps: MaxSteps = None,
     jobs: Annotated[int, typer.Option("--jobs", min=1, help="Processes.")] = 1,

@@ -105,9 +105,6 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         `seeds` has the first seed of every part of the run. `validation_mean` and what is said of
         a part are null where the run was stopped before.
     """
-    import gymnasium
-    import sklearn
-
     plan, rules = aggregation.plan, aggregation.rule_set
     return {
         "what": f"{_most_rules(aggregation)} rules an action dimension for {aggregation.env_id}",
@@ -147,12 +144,7 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
             "steps": rules.source.steps,
             "episodes": rules.source.episodes,
         },
-        "versions": {
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-            "gymnasium": gymnasium.__version__,
-            "scikit-learn": sklearn.__version__,
-        },
+        "versions": versions_used(),
         "made": datetime.now(UTC).date().isoformat(),
     }
 
@@ -179,6 +171,19 @@ def _round(one: AggregationRound) -> dict[str, Any]:
         "coverage": round(one.coverage, 4),
         "disagreement": round(one.disagreement, 4),
         **({} if one.failures is None else {"failures": one.failures.count}),
+    }
+
+
+def versions_used() -> dict[str, str]:
+    """Of the programs that what a card says hangs on."""
+    import gymnasium
+    import sklearn
+
+    return {
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "gymnasium": gymnasium.__version__,
+        "scikit-learn": sklearn.__version__,
     }
 
 

@@ -75,6 +75,33 @@ def mine_rules(
             grown with another divider.
     """
     thresholds = Thresholds(supp_min, conf_min, lift_min, max_depth)
+    trees = mined_trees(demonstrations_or_trees, divider)
+    rules = []
+    for tree in trees:
+        nodes = cut_nodes(
+            tree, supp_min=supp_min, conf_min=conf_min, lift_min=lift_min, max_depth=max_depth
+        )
+        rules += rules_at(tree, nodes)
+    return mined_set(rules, trees, thresholds, demonstrations_or_trees)
+
+
+def mined_trees(
+    demonstrations_or_trees: Demonstrations | PolicyTree | Sequence[PolicyTree],
+    divider: int | None,
+) -> tuple[PolicyTree, ...]:
+    """The trees that rules are mined from.
+
+    Args:
+        demonstrations_or_trees: N pairs, or the tree or trees grown from them.
+        divider: Number of intervals of continuous dimensions; 2 where not given, or what the
+            trees were grown with.
+
+    Returns:
+        One an action dimension.
+
+    Raises:
+        InputError: If there is none, or they were grown with another divider.
+    """
     if isinstance(demonstrations_or_trees, Demonstrations):
         trees = grow_policy_trees(
             demonstrations_or_trees, divider=2 if divider is None else divider
@@ -92,12 +119,26 @@ def mine_rules(
             f"the divider is {divider} and the trees were grown with {trees[0].divider}; leave it "
             f"out, or grow them again: grow_policy_trees(demonstrations, divider={divider})"
         )
-    rules = []
-    for tree in trees:
-        nodes = cut_nodes(
-            tree, supp_min=supp_min, conf_min=conf_min, lift_min=lift_min, max_depth=max_depth
-        )
-        rules += rules_at(tree, nodes)
+    return trees
+
+
+def mined_set(
+    rules: Sequence[Rule],
+    trees: Sequence[PolicyTree],
+    thresholds: Thresholds,
+    demonstrations_or_trees: object,
+) -> RuleSet:
+    """Rules with what they were mined from, and how.
+
+    Args:
+        rules: Of all trees.
+        trees: One an action dimension.
+        thresholds: That the rules were mined at.
+        demonstrations_or_trees: What the trees were made of.
+
+    Returns:
+        The rule set; with data boxes where demonstrations were given.
+    """
     mined = RuleSet(
         rules=tuple(rules),
         actions=tuple(tree.dimension for tree in trees),

@@ -19,16 +19,16 @@ first seed            what its episodes are for
                       `SEEDS_A_LEARNER` for each
 `POOLED`              the benchmark of intervals draws its demonstrations from these
 `CERTIFIED`           certificates; nothing is chosen by them
-`ROUNDS`              rounds of `aggregate`, `SEEDS_A_ROUND` for each
+`ROUNDS`              rounds of `aggregate` and of `probe`, `SEEDS_A_ROUND` for each
 `VALIDATION`          the best of its rounds, or of its refinement, is chosen by them
 `REFINEMENT`          the search of its refinement
 `REPORT`              what came of it is reported on them
 ====================  =====================================================================
 
-`aggregate --seed s` begins s times `SEEDS_A_RUN` further on, whatever the purpose. Within one run
-no two purposes meet: `MOST_ROUNDS` and the numbers beside it see to that. What the paper is
-reproduced with, and what certificates are made on, lies below all of them, so no run, however far
-on, reaches it.
+`aggregate --seed s` and `probe --seed s` begin s times `SEEDS_A_RUN` further on, whatever the
+purpose. Within one run no two purposes meet: `MOST_ROUNDS` and the numbers beside it see to that.
+What the paper is reproduced with, and what certificates are made on, lies below all of them, so no
+run, however far on, reaches it.
 
 `RANGES` says how far each purpose goes. Ranges that do meet, `SHARED`, and why that does no harm:
 
@@ -44,6 +44,7 @@ They stay as they are, because shipped files name them. Besides:
 - Runs of `aggregate` whose seeds are ten apart: the rounds of one are the validation of the other.
   They share no rules.
 - Cards of older rule sets name a second validation, half a `SEEDS_A_RUN` behind the first.
+- `aggregate` and `probe` of the same seed play the same episodes. Neither chooses by the other.
 - `FRESH` serves all pages, the search for gaps included. Nothing that is shipped is chosen by it.
 """
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.applications import labels_of
+from sarl_core.mining.rule_set import RuleSet, obeying_labels
 from sarl_core.shielding.shield import Shield
 
 
@@ -42,18 +43,9 @@ def leeway_of(rule_set: RuleSet, demonstrations: Demonstrations) -> Leeway:
     shield = Shield(rule_set, on_invalid="pass")
     states = demonstrations.raw_observations
     decision = shield.decide_batch(states, demonstrations.actions)
-    in_force = decision.rules
-    covered = in_force >= 0
-    labels = [
-        dimension.labels_of(demonstrations.action_columns[:, index])
-        for index, dimension in enumerate(rule_set.actions)
-    ]
-    obeyed = sum(
-        int(
-            rule.obeyed_by(labels[rule.dimension][decision.rules[:, rule.dimension] == place]).sum()
-        )
-        for place, rule in enumerate(rule_set.rules)
-    )
+    covered = decision.rules >= 0
+    labels = labels_of(rule_set, demonstrations)
+    obeyed = int(obeying_labels(rule_set)[decision.rules[covered], labels[covered]].sum())
     count = int(covered.sum())
     return Leeway(
         coverage=float(covered.mean()),

@@ -522,7 +522,8 @@ class Shield:
     def scanned(self) -> tuple[int, ...]:
         """The rules in whose place another may apply when they are taken out.
 
-        Rules mined from one tree never overlap, so where one is taken out, none applies.
+        Rules that demand and were mined from one tree never overlap, so where one is taken out,
+        none applies; of never-rules this says nothing.
         """
         return tuple(index for matcher in self._matchers for index in matcher.scanned)
 

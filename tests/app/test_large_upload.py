@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 from streamlit.testing.v1 import AppTest
@@ -29,9 +30,9 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     """Reading goes on for as long as the test wants."""
     go_on, read = threading.Event(), view._read
 
-    def waiting(*given: object) -> object:
+    def waiting(*given: Any) -> object:
         assert go_on.wait(WAIT)
-        return read(*given)  # type: ignore[arg-type]
+        return read(*given)
 
     monkeypatch.setattr(view, "_read", waiting)
     yield go_on

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-import platform
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sarl_core.files import whole_file
-from sarl_core.improving.aggregation_files import card_path, reported_entries
+from sarl_core.improving.aggregation_files import card_path, reported_entries, versions_used
 from sarl_core.improving.probing.probing import ProbeRound, Probing
 from sarl_core.mining.rule_files.writing import write_rules
 from sarl_core.rollouts import seeds
@@ -48,9 +45,6 @@ def probing_card(probing: Probing, *, command: str) -> dict[str, Any]:
         probing: Finished.
         command: That makes it again.
     """
-    import gymnasium
-    import sklearn
-
     plan, rules = probing.plan, probing.rule_set
     run = (("rounds", seeds.ROUNDS), ("validation", seeds.VALIDATION), ("report", seeds.REPORT))
     return {
@@ -72,12 +66,7 @@ def probing_card(probing: Probing, *, command: str) -> dict[str, Any]:
             "states": len(probing.outcomes),
             "failed": [round(float(one.mean()), 4) for one in probing.outcomes.failed],
         },
-        "versions": {
-            "python": platform.python_version(),
-            "numpy": np.__version__,
-            "gymnasium": gymnasium.__version__,
-            "scikit-learn": sklearn.__version__,
-        },
+        "versions": versions_used(),
         "made": datetime.now(UTC).date().isoformat(),
     }
 

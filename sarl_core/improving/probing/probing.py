@@ -26,7 +26,7 @@ from sarl_core.improving.probing.probe_rules import probe_rules
 from sarl_core.improving.questions import answered
 from sarl_core.mining.combining.candidates import candidates, pairs_of_like_kind
 from sarl_core.mining.environment_actions import environment_dimensions
-from sarl_core.mining.labels import LabelledDimension
+from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.processes import executor_of, run_each
 from sarl_core.progress import Progress, part_of
@@ -99,6 +99,7 @@ class ProbePlan:
             ("rounds", self.rounds, seeds.MOST_ROUNDS),
             ("validation episodes", self.validation, seeds.MOST_VALIDATION),
             ("report episodes", self.report, seeds.MOST_VALIDATION),
+            ("intervals", self.divider, MAX_DIVIDER),
         ):
             if value > most:
                 raise InputError(f"there are {value:,} {name}; give at most {most:,}")

@@ -17,16 +17,16 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sarl_core.errors import InputError
 from sarl_core.mining.never.never_rules import never_thresholds, upper_bound
 from sarl_core.mining.thresholds.grids import (
     Floats,
     Places,
+    drawn_trees,
     grid_axis,
     places_of,
     rectangle_sums,
 )
-from sarl_core.mining.tree import PolicyTree, highest_above, several_trees
+from sarl_core.mining.tree import PolicyTree, highest_above
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -112,13 +112,7 @@ def never_landscape(
         InputError: If there is no tree, a grid is empty, not ascending or out of its range, or
             the maximum depth is none.
     """
-    trees = several_trees(
-        trees,
-        "what a landscape is drawn of must be trees",
-        "grow them: grow_policy_trees(demonstrations)",
-    )
-    if not trees:
-        raise InputError("there is no tree to draw a landscape of; grow the trees first")
+    trees = drawn_trees(trees)
     supports, epsilons = grid_axis(supports, "supports"), grid_axis(epsilons, "epsilons")
     for end in (epsilons[0], epsilons[-1]):
         never_thresholds(float(end), 0.0, max_depth)

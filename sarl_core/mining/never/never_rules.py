@@ -15,13 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import InputError, require
-from sarl_core.mining.algorithm_1 import conditions_to
-from sarl_core.mining.envelope import with_boxes
-from sarl_core.mining.growing.growth import grow_policy_trees
+from sarl_core.errors import require
+from sarl_core.mining.algorithm_1 import conditions_to, mined_set, mined_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
-from sarl_core.mining.tree import PolicyTree, several_trees, source_of
+from sarl_core.mining.tree import PolicyTree
 
 _CERTAINTY = 0.95  # one-sided: that the share is not larger
 
@@ -78,7 +76,7 @@ def mine_never_rules(
     epsilon: float,
     supp_min: float = 0.0,
     max_depth: int | None = None,
-    divider: int = 2,
+    divider: int | None = None,
 ) -> RuleSet:
     """Mine rules that forbid what the expert does at most rarely.
 
@@ -88,43 +86,25 @@ def mine_never_rules(
             0, below 1.
         supp_min: Minimum support of a rule, 0 to 1.
         max_depth: Longest rule, in queries.
-        divider: Number of intervals of continuous dimensions, where demonstrations are given.
+        divider: Number of intervals of continuous dimensions; 2 where not given, or what the
+            trees were grown with.
 
     Returns:
         The rules, by action dimension, label and node. With two labels a rule that forbids one
         demands the other. With their data boxes where demonstrations were given.
 
     Raises:
-        InputError: If a threshold is out of range, or there is nothing to mine.
+        InputError: If a threshold is out of range, there is nothing to mine, or the trees were
+            grown with another divider.
     """
     thresholds = never_thresholds(epsilon, supp_min, max_depth)
-    if isinstance(demonstrations_or_trees, Demonstrations):
-        trees = grow_policy_trees(demonstrations_or_trees, divider=divider)
-    else:
-        trees = several_trees(
-            demonstrations_or_trees,
-            "what rules are mined from must be Demonstrations, or trees grown from them,",
-            "load some: load_demonstrations(path)",
-        )
-    if not trees:
-        raise InputError("there is no tree to mine; give demonstrations, or grow the trees first")
-    mined = RuleSet(
-        rules=tuple(
-            rule
-            for tree in trees
-            for rule in never_rules_of(
-                tree, epsilon=epsilon, supp_min=supp_min, max_depth=max_depth
-            )
-        ),
-        actions=tuple(tree.dimension for tree in trees),
-        source=source_of(trees),
-        thresholds=thresholds,
-        divider=trees[0].divider,
-        learner=trees[0].learner,
-    )
-    if isinstance(demonstrations_or_trees, Demonstrations):
-        return with_boxes(mined, demonstrations_or_trees)
-    return mined
+    trees = mined_trees(demonstrations_or_trees, divider)
+    rules = [
+        rule
+        for tree in trees
+        for rule in never_rules_of(tree, epsilon=epsilon, supp_min=supp_min, max_depth=max_depth)
+    ]
+    return mined_set(rules, trees, thresholds, demonstrations_or_trees)
 
 
 def with_never_rules(rule_set: RuleSet, trees: Sequence[PolicyTree], epsilon: float) -> RuleSet:

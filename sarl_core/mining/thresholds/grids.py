@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.errors import InputError
+from sarl_core.mining.tree import PolicyTree, several_trees
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +31,25 @@ class Places(NamedTuple):
     node: NDArray[np.int64]
     enters: NDArray[np.int64]
     leaves: NDArray[np.int64]
+
+
+def drawn_trees(trees: PolicyTree | Sequence[PolicyTree]) -> tuple[PolicyTree, ...]:
+    """The trees that a landscape is drawn of.
+
+    Args:
+        trees: One an action dimension, or a single one.
+
+    Raises:
+        InputError: If there is none.
+    """
+    trees = several_trees(
+        trees,
+        "what a landscape is drawn of must be trees",
+        "grow them: grow_policy_trees(demonstrations)",
+    )
+    if not trees:
+        raise InputError("there is no tree to draw a landscape of; grow the trees first")
+    return trees
 
 
 def grid_axis(values: ArrayLike, name: str) -> Floats:

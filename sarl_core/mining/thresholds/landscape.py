@@ -15,19 +15,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sarl_core.errors import InputError
 from sarl_core.mining.evidence import EpisodeCounts, EpisodeSums
 from sarl_core.mining.language import limit_text
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.grids import (
     Floats,
     Places,
+    drawn_trees,
     grid_axis,
     places_of,
     rectangle_sums,
     summed,
 )
-from sarl_core.mining.tree import PolicyTree, highest_above, several_trees
+from sarl_core.mining.tree import PolicyTree, highest_above
 from sarl_core.notebooks import table_html
 
 if TYPE_CHECKING:
@@ -214,13 +214,7 @@ def threshold_landscape(
             another threshold is out of range.
     """
     Thresholds(0.0, 0.0, lift_min, max_depth)
-    trees = several_trees(
-        trees,
-        "what a landscape is drawn of must be trees",
-        "grow them: grow_policy_trees(demonstrations)",
-    )
-    if not trees:
-        raise InputError("there is no tree to draw a landscape of; grow the trees first")
+    trees = drawn_trees(trees)
     supports = grid_axis(supports, "supports")
     confidences = grid_axis(confidences, "confidences")
     places = [

@@ -76,7 +76,16 @@ class Careless:
         return np.full((len(observations), 1), 2)
 
 
-INWARDS, CARELESS = Inwards(), Careless()
+class HalfBlind:
+    """It stands still on the left, and on the right goes on until it falls."""
+
+    name, n_uniforms = "half blind", 0
+
+    def act(self, observations: Any, uniforms: Any) -> Any:
+        return np.where(observations < 0, 1, 2)
+
+
+INWARDS, CARELESS, HALF_BLIND = Inwards(), Careless(), HalfBlind()
 
 
 def outcomes_of(expert: Any = INWARDS, env_id: Any = LEDGE) -> list[Outcomes]:
@@ -105,14 +114,15 @@ def test_each_outcome_is_what_the_ledge_makes_of_it():
 
 
 def test_a_state_that_is_lost_whatever_is_done_says_nothing():
-    for outcomes in outcomes_of(CARELESS):
-        # Only where the time is up before it would have fallen.
-        assert (outcomes.observations[:, 0] + LIMIT - outcomes.steps <= EDGE).all()
+    """Episodes begin on both sides, and this expert falls from the middle and beyond it."""
+    outcomes = Outcomes.join(outcomes_of(HALF_BLIND))
+    assert len(outcomes) > 10
+    assert (outcomes.observations < 0).all()
 
 
 def test_a_state_in_which_an_action_was_cut_short_says_nothing():
-    for outcomes in outcomes_of():
-        assert (outcomes.steps <= LIMIT - STEPS).all()
+    steps = Outcomes.join(outcomes_of()).steps
+    assert LIMIT - 2 * STEPS < steps.max() <= LIMIT - STEPS
 
 
 def test_rules_forbid_what_falls_and_nothing_else(probing):
@@ -205,6 +215,7 @@ def test_actions_without_bounds_are_refused():
         ({"episodes": 10**6}, "at most 10,000"),
         ({"validation": 25_000_000}, "at most 500,000"),
         ({"report": 25_000_000}, "at most 500,000"),
+        ({"divider": 10**9}, "intervals; give at most"),
         ({"risk": "much"}, "the risk must be a number"),
     ],
 )
