@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -35,6 +35,10 @@ from sarl_core.cli.options import (
 )
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
 @with_environment
@@ -429,6 +433,19 @@ def _require_no_reading(
         )
 
 
+def _left_out(supports: NDArray[np.float64], least: float, file: Path) -> str:
+    """What is said of minimum supports that trees were not grown down to."""
+    if supports[-1] < least:
+        raise InputError(
+            f"{file}: its trees were grown down to a support of {least:g}; begin --supports there "
+            "or above, or mine the steps again with a smaller --support"
+        )
+    return (
+        f"minimum supports below {least:g} are left out: the trees were grown down to there, and "
+        "rules of fewer states are not known"
+    )
+
+
 @with_environment
 @with_columns
 @with_derived
@@ -510,6 +527,10 @@ def landscape(
             _require_no_reading(files, env, columns, derived, missing)
             mined = load_mined_data(files[0])
             trees, notes = mined.trees, mined.notes
+            known = rows[rows >= mined.min_support]
+            if len(known) < len(rows):
+                notes = *notes, _left_out(rows, mined.min_support, files[0])
+            grid = known, grid[1]
         else:
             recorded = read_demonstrations(files, env, columns, missing)
             recorded = with_wanted(recorded, derived, divider=divider)

@@ -6,6 +6,7 @@ import json
 import os
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
@@ -100,8 +101,18 @@ def test_a_mined_file_answers_check_and_landscape(run, mined_file, tmp_path):
     assert "what is left of" in run("check", mined_file)
     printed = run("landscape", mined_file, "--out", tmp_path / "plane.json")
     assert "grown down to a support of 0.001" in printed
+    assert "minimum supports below 0.001 are left out" in printed
     plane = json.loads((tmp_path / "plane.json").read_text())
+    assert plane["supports"] == pytest.approx(np.arange(0.05, 0.51, 0.05))
     assert plane["rule_count"][0][-1] > plane["rule_count"][-1][-1]
+
+
+def test_a_landscape_of_supports_that_trees_do_not_reach_is_refused(mined_file, tmp_path, capsys):
+    out = tmp_path / "plane.json"
+    below = ("--supports", "0:0.0005:0.0001")
+    assert main(["landscape", str(mined_file), *below, "--out", str(out)]) == 2
+    assert "begin --supports there or above" in capsys.readouterr().err
+    assert not out.exists()
 
 
 WRONG = {
