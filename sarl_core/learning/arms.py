@@ -23,7 +23,7 @@ LAST_SEED = 89  # of a learner: the next one would see the episodes that all are
 
 Memory = Literal["proposed", "executed", "masked"]
 """What a policy-gradient learner believes it did: what it proposed; what was executed, with its own
-log-probability; or that in a state with a rule there was nothing to choose."""
+log-probability; or that it chose from what the rules left, which where one demands is nothing."""
 
 
 @dataclass(frozen=True)
@@ -89,8 +89,8 @@ _ALL = (
     LearningArm(
         "mask",
         "Mask",
-        "Where a rule applies PPO has only the rule's action to sample, and nothing to learn "
-        "from; elsewhere it learns as usual.",
+        "PPO samples only what the rules leave: where one demands an action it has nothing to "
+        "learn from, where some forbid it learns to choose from the rest.",
         memory="masked",
         discrete_only=True,
     ),
@@ -196,12 +196,6 @@ def check_learning(
         raise InputError(
             f"the arm {arm.name!r} learns under a shield and there are no rules for it; give "
             "a rule file, or choose an arm without a shield (none, none-replay)"
-        )
-    # Where an action is forbidden several are left, and which of them is a choice of its own.
-    if arm.memory == "masked" and rules is not None and rules.forbids:
-        raise InputError(
-            f"the arm {arm.name!r} learns from what rules demand, and some of these forbid; choose "
-            "override, penalty, executed or replay"
         )
     if rules is not None:
         from sarl_core.rollouts.player import check_environment

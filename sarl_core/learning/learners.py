@@ -5,6 +5,8 @@ Loads torch and Stable-Baselines3: imported only where something is learned.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -21,11 +23,14 @@ from stable_baselines3.common.distributions import (
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch.nn import functional
 
-from sarl_core.learning.replay_buffers import Lessons, ShieldedRolloutBuffer
+from sarl_core.learning.replay_buffers import HandoverVecEnv, Lessons, ShieldedRolloutBuffer
+
+_NEVER = -1e8
+"""Score of an action that is not allowed: its probability is 0, its entropy and gradient too."""
 
 
 class DecidedPolicy(ActorCriticPolicy):
-    """Acts more decidedly than it is taught.
+    """Acts more decidedly than it is taught, and samples only what is allowed.
 
     Rules give one action where the expert wavered between two, so who is taught by them wavers
     too, and acting on each doubt at random fails. With sharpness k the network's outputs count
@@ -33,7 +38,12 @@ class DecidedPolicy(ActorCriticPolicy):
 
     Attributes:
         sharpness: How many times; of discrete actions only.
+        venv: Whose shield says what may be sampled; to be set before the first step.
+        allowed: Which discrete actions it chooses from in the states that it is asked about next,
+            (B, actions); None for all.
     """
+
+    venv: HandoverVecEnv
 
     def __init__(self, *args: Any, sharpness: float = 1.0, **kwargs: Any) -> None:
         """As `ActorCriticPolicy`.
@@ -44,12 +54,45 @@ class DecidedPolicy(ActorCriticPolicy):
             kwargs: Handed on.
         """
         self.sharpness = sharpness
+        self.allowed: torch.Tensor | None = None
         super().__init__(*args, **kwargs)
+
+    def forward(
+        self, obs: torch.Tensor, deterministic: bool = False
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Choose the actions of a step.
+
+        Args:
+            obs: What the environments have just shown, (n_envs, d).
+            deterministic: Whether to take the best.
+
+        Returns:
+            Actions, values and log-probabilities.
+        """
+        choices = self.venv.look()
+        with self.choosing_from(None if choices is None else torch.from_numpy(choices)):
+            return super().forward(obs, deterministic)
+
+    @contextmanager
+    def choosing_from(self, allowed: torch.Tensor | None) -> Iterator[None]:
+        """Leave the network these actions meanwhile.
+
+        Args:
+            allowed: As the attribute.
+        """
+        self.allowed = allowed
+        try:
+            yield
+        finally:
+            self.allowed = None
 
     def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Distribution:
         if not isinstance(self.action_dist, CategoricalDistribution):
             return super()._get_action_dist_from_latent(latent_pi)
-        return self.action_dist.proba_distribution(self.sharpness * self.action_net(latent_pi))
+        scores = self.sharpness * self.action_net(latent_pi)
+        if self.allowed is not None:
+            scores = scores.masked_fill(~self.allowed, _NEVER)
+        return self.action_dist.proba_distribution(scores)
 
     def taught(self, observations: torch.Tensor) -> Distribution:
         """What it has been taught.
@@ -76,14 +119,16 @@ class Batch(NamedTuple):
     advantages: torch.Tensor
     returns: torch.Tensor
     free: torch.Tensor
+    allowed: torch.Tensor
 
 
 class MaskedPPO(PPO):
-    """PPO that leaves out of its policy's gradient the steps at which a rule decided.
+    """PPO whose policy's gradient is that of choosing from what the rules left.
 
-    A rule prescribes one action. Masking the others leaves one to sample, with probability 1
-    whatever the network says, so the step has no gradient and no entropy: exactly what leaving
-    it out does. The network can be taught the rules instead, by `imitation`.
+    A rule that demands prescribes one action. Masking the others leaves one to sample, with
+    probability 1 whatever the network says, so the step has no gradient and no entropy: exactly
+    what leaving it out does. Rules that forbid leave several, and the probabilities of those are
+    made to add up to 1. The network can be taught the rules as well, by `imitation`.
 
     Attributes:
         imitation: Weight of the loss that draws the network towards the rules.
@@ -110,7 +155,9 @@ class MaskedPPO(PPO):
 
     def _loss(self, batch: Batch, clip: float) -> torch.Tensor:
         """PPO's loss, of which forced rows only have the part of the values."""
-        values, log_prob, entropy = self.policy.evaluate_actions(batch.observations, batch.actions)
+        policy = cast(DecidedPolicy, self.policy)
+        with policy.choosing_from(batch.allowed if batch.allowed.shape[1] else None):
+            values, log_prob, entropy = policy.evaluate_actions(batch.observations, batch.actions)
         advantages = batch.advantages
         if len(advantages) > 1:
             advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
@@ -132,7 +179,9 @@ class MaskedPPO(PPO):
         policy = cast(DecidedPolicy, self.policy)
         distribution = policy.taught(torch.from_numpy(lessons.observations[rows]))
         if isinstance(distribution, CategoricalDistribution):
-            return -distribution.log_prob(actions[:, 0]).mean()
+            allowed = torch.from_numpy(lessons.allowed[rows])
+            scores = distribution.distribution.logits
+            return -scores.masked_fill(~allowed, -torch.inf).logsumexp(dim=1).mean()
         assert isinstance(distribution, DiagGaussianDistribution)
         normal = distribution.distribution
         # Only the mean learns from this: drawing the deviation in would end all exploring.
@@ -142,7 +191,8 @@ class MaskedPPO(PPO):
 
 def _batch(buffer: ShieldedRolloutBuffer) -> Batch:
     def rows(values: NDArray[Any]) -> torch.Tensor:
-        return torch.from_numpy(values.reshape(-1, *values.shape[2:]))
+        steps, envs, *rest = values.shape  # of which the rest may be none
+        return torch.from_numpy(values.reshape(steps * envs, *rest))
 
     actions = rows(buffer.actions)
     return Batch(
@@ -152,6 +202,7 @@ def _batch(buffer: ShieldedRolloutBuffer) -> Batch:
         advantages=rows(buffer.advantages),
         returns=rows(buffer.returns),
         free=~rows(buffer.forced),
+        allowed=rows(buffer.allowed),
     )
 
 

@@ -144,6 +144,9 @@ def _policy_gradient(
         common = {**common, "policy": learners.DecidedPolicy}
         model = learners.MaskedPPO(**common, **recipe)
         model.imitation = arm.imitation
+        assert isinstance(model.policy, learners.DecidedPolicy)
+        assert isinstance(env, learning_memory.HandoverVecEnv)
+        model.policy.venv = env
     assert isinstance(model.rollout_buffer, learning_memory.ShieldedRolloutBuffer)
     model.rollout_buffer.policy = model.policy
     return model

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.applications import labels_of
 from sarl_core.mining.rule_set import RuleSet, obeying_labels
@@ -23,6 +26,28 @@ class Leeway:
     coverage: float
     fidelity: float
     freedom: float
+
+
+def allowed_actions(shield: Shield, observations: ArrayLike, count: int) -> NDArray[np.bool_]:
+    """What a shield lets pass in each state.
+
+    Args:
+        shield: For one discrete action, counted from 0.
+        observations: Shape (B, d).
+        count: Number of actions.
+
+    Returns:
+        Shape (B, count); at least one in each state. Where everything is forbidden, what the
+        shield executes then.
+
+    Raises:
+        InputError: As `Shield.decide_batch`.
+    """
+    states = np.asarray(observations)
+    proposed = np.repeat(np.arange(count), len(states))
+    # Asked of the shield itself, so that the two never differ.
+    decision = shield.decide_batch(np.tile(states, (count, 1)), proposed)
+    return ~decision.intervened.reshape(count, len(states)).T
 
 
 def leeway_of(rule_set: RuleSet, demonstrations: Demonstrations) -> Leeway:

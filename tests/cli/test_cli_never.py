@@ -118,12 +118,13 @@ def test_where_they_are_not_understood_that_is_said(typed, tmp_path, command):
     assert "some of these forbid one" in error
 
 
-def test_a_learner_that_is_taught_what_rules_demand_takes_none_that_forbid(typed, tmp_path):
-    rules = "data/rules/lunar_lander_never.json"
-    arguments = ("learn", "--env", "LunarLander-v3", "--rules", rules, "--steps", "2048")
-    code, _, error = typed(*arguments, "--arm", "mask", "--out", str(tmp_path / "learned"))
-    assert code == 2
-    assert "choose override, penalty, executed or replay" in error
+def test_a_learner_chooses_from_what_they_leave(typed, tmp_path):
+    rules, folder = "data/rules/lunar_lander_never.json", tmp_path / "learned"
+    arguments = ("learn", "--env", "LunarLander-v3", "--rules", rules, "--steps", "2048", "--json")
+    options = ("--arm", "mask", "--episodes", "1")
+    code, told, _ = typed(*arguments, *options, "--out", str(folder))
+    assert code == 0
+    assert [arm["arm"] for arm in json.loads(told)["arms"]] == ["mask"]
 
 
 def test_probes_leave_rules_and_a_card(typed, tmp_path):

@@ -219,17 +219,17 @@ def test_sharpness_changes_how_decidedly_it_acts_and_not_what_it_is_taught(
 
 
 def test_the_oldest_lessons_go_first() -> None:
-    lessons = Lessons(1, 1, most=3)
+    lessons = Lessons(1, 1, 1, most=3)
     for value in range(5):
         row = np.full((1, 1), value, dtype=np.float32)
-        lessons.add(row, row, np.ones((1, 1), dtype=np.bool_))
+        lessons.add(row, row, *np.ones((2, 1, 1), dtype=np.bool_))
     assert sorted(lessons.observations[:, 0].tolist()) == [2.0, 3.0, 4.0]
     assert len(lessons) == 3
-    other = Lessons(1, 1, most=3)
+    other = Lessons(1, 1, 1, most=3)
     other.restore(lessons.state())
     row = np.full((1, 1), 9, dtype=np.float32)
     for each in (lessons, other):
-        each.add(row, row, np.ones((1, 1), dtype=np.bool_))
+        each.add(row, row, *np.ones((2, 1, 1), dtype=np.bool_))
     np.testing.assert_array_equal(lessons.observations, other.observations)
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from sarl_core import Demonstrations, RuleSet, Shield, grow_policy_trees, mine_rules
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.never.never_rules import mine_never_rules, with_never_rules
-from sarl_core.shielding.leeway import leeway_of
+from sarl_core.shielding.leeway import allowed_actions, leeway_of
 from tests.mining.strategies import labelled_states
 
 
@@ -71,6 +71,9 @@ def test_one_by_one_in_a_batch_and_by_the_rules_words(shown, epsilon, supp_min, 
         assert together.intervened[row] == alone.intervened
         assert together.margin[row] == alone.margin
         assert freedom[row] == pytest.approx(np.log(allowed) / np.log(count))
+    passing = allowed_actions(shield, shown.observations, count)
+    np.testing.assert_array_equal(passing.reshape(-1), ~together.intervened)
+    assert passing.any(axis=1).all()
     in_force = shield.rules_in_force(shown.observations)[:, 0]
     for state, found in zip(shown.observations, in_force.tolist(), strict=True):
         applying = [place for place, rule in enumerate(rules) if rule.applies(state[None])[0]]
