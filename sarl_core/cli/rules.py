@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from sarl_core.mining.rule_set import RuleSet
+    from sarl_core.mining.tree import PolicyTree
+
 
 @with_environment
 @with_columns
@@ -154,7 +157,7 @@ def mine(
     """
     far = cluster is not None or any(map(is_mined_file, [out, *files]))
     if never is not None:
-        _require_near(far, hold_out, lower_bound, cross_fit=cross_fit)
+        _require_near(far)
     if far:
         _mine_at_a_distance(
             files,
@@ -205,7 +208,6 @@ def mine(
         from sarl_core.mining.never.never_rules import mine_never_rules, with_never_rules
         from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
         from sarl_core.mining.validation import cross_fitting, holding_out
-        from sarl_core.mining.validation.episode_counts import count_rules
         from sarl_core.shielding.leeway import leeway_of
 
         pair = (support or 0.0, confidence or 0.0)
@@ -226,18 +228,16 @@ def mine(
             demonstrations = split.mined
         chosen = learner_for(learner, len(demonstrations))
         trees = grow_policy_trees(demonstrations, divider=divider, learner=chosen)
-        if forbids_alone and never is not None:
-            mined_rules = mine_never_rules(
-                trees, epsilon=never, supp_min=pair[0], max_depth=max_depth
-            )
-        else:
-            mined_rules = mine_rules(
+
+        def mined_from(trees: Sequence[PolicyTree]) -> RuleSet:
+            if forbids_alone and never is not None:
+                return mine_never_rules(trees, epsilon=never, supp_min=pair[0], max_depth=max_depth)
+            demanding = mine_rules(
                 trees, supp_min=pair[0], conf_min=pair[1], lift_min=lift, max_depth=max_depth
             )
-            if never is not None:
-                mined_rules = with_never_rules(mined_rules, trees, never)
-        rule_set = with_boxes(mined_rules, demonstrations)
-        leeway = None if never is None else leeway_of(rule_set, demonstrations)
+            return demanding if never is None else with_never_rules(demanding, trees, never)
+
+        rule_set = with_boxes(mined_from(trees), demonstrations)
         judged = None
         if cross_fit:
             fit = cross_fitting.cross_fit(
@@ -247,7 +247,7 @@ def mine(
                 combined=combined,
                 learner=chosen,
             )
-            judged = fit.at(rule_set.thresholds)
+            judged = fit.at(rule_set.thresholds) if never is None else fit.of(mined_from)
         if split is not None:
             rule_set = holding_out.with_held_out(rule_set, split.held_out)
         short = None
@@ -256,9 +256,9 @@ def mine(
             short = holding_out.shortfall(rule_set.rules, lower_bound, episodes)
             rule_set = holding_out.with_lower_bound(rule_set, lower_bound)
         if hold_out is not None and split is not None:
-            counts = count_rules(rule_set, split.held_out)
-            judged_on_them = cross_fitting.judge(rule_set, counts)
+            judged_on_them = cross_fitting.judge_pairs(rule_set, split.held_out)
             tried = Tried(hold_out, seed, split.mined.n_episodes, judged_on_them, short)
+        leeway = None if never is None else leeway_of(rule_set, demonstrations)
         rule_set.save(out)
     if as_json:
         terminal.print_json(describe_rules(rule_set, out, tried, judged, leeway) | oddities)
@@ -268,25 +268,17 @@ def mine(
         print_learner(trees)
 
 
-def _require_near(
-    far: bool, hold_out: float | None, lower_bound: float | None, *, cross_fit: bool
-) -> None:
-    """Refuse what is not known of rules that forbid.
+def _require_near(far: bool) -> None:
+    """Refuse rules that forbid where steps are not here.
 
     Raises:
-        InputError: If any of it was asked for.
+        InputError: If they are on a cluster, or in a .mined file.
     """
-    options = {
-        "--cluster, or a .mined file,": far,
-        "--hold-out": hold_out is not None,
-        "--lower-bound": lower_bound is not None,
-        "--cross-fit": cross_fit,
-    }
-    for option, given in options.items():
-        if given:
-            raise InputError(
-                f"{option} is for rules that demand an action; leave it out, or leave out --never"
-            )
+    if far:
+        raise InputError(
+            "--cluster, or a .mined file, is for rules that demand an action; leave it out, or "
+            "leave out --never"
+        )
 
 
 def _mine_at_a_distance(

@@ -67,9 +67,9 @@ def test_what_is_left_to_an_agent_is_told(typed, tmp_path):
         (("--never", "0"), "above 0 and below 1"),
         (("--never", "1"), "above 0 and below 1"),
         (("--never", "0.1", "--confidence", "0.9"), "give both --support and --confidence"),
-        (("--never", "0.1", "--hold-out", "0.2"), "--hold-out is for rules that demand"),
+        (("--never", "0.1", "--hold-out", "2"), "the held-out share is 2"),
+        (("--never", "0.1", "--lower-bound", "0.8"), "give --hold-out as well"),
         (("--never", "0.1", "--lift", "3"), "--lift is for rules that demand"),
-        (("--never", "0.1", "--cross-fit"), "--cross-fit is for rules that demand"),
         (("--never", "0.1", "--cluster", "local:2"), "--cluster, or a .mined file, is for rules"),
     ],
 )
@@ -80,6 +80,36 @@ def test_what_cannot_be_mined_is_one_sentence(typed, tmp_path, options, said):
     assert said in error
     assert error.count("\n") == 1
     assert not out.exists()
+
+
+def test_other_episodes_say_how_often_they_hold(typed, tmp_path):
+    out, read = tmp_path / "never.json", tmp_path / "never.md"
+    arguments = ("mine", LANDER, "--never", "0.1", "--support", "0.01", "--hold-out", "0.3")
+    code, told, _ = typed(*arguments, "--cross-fit", "--out", str(out))
+    assert code == 0
+    assert "; held out: 97.1 % in 19 episodes (2,992 states), 90 to 99.8 %." in told
+    assert "1 reach 90 % with their whole interval, 15 open, 0 below it, 0 met" in told
+    assert typed("export", str(out), "--out", str(read))[0] == 0
+    assert "| did not in 97.1 % in 19 episodes (90 to 99.8 %) |" in read.read_text()
+    code, told, _ = typed(*arguments, "--cross-fit", "--json", "--out", str(out))
+    document = json.loads(told)
+    assert document["cross_fitted"]["fidelity"]["low"] < document["fidelity"]
+    assert document["cross_fitted"]["episodes"] == 43
+    held_out = document["held_out"]
+    verdicts = [held_out[f"rules_{one}"] for one in ("below", "open", "reached", "unknown")]
+    assert sum(verdicts) == document["rules"]
+
+
+def test_rules_that_forbid_are_dropped_below_a_lower_bound(typed, tmp_path):
+    out = tmp_path / "never.json"
+    arguments = ("mine", LANDER, "--never", "0.1", "--support", "0.01", "--hold-out", "0.3")
+    options = ("--lower-bound", "0.8", "--out", str(out), "--json")
+    code, told, _ = typed(*arguments, *options)
+    assert code == 0
+    rules = RuleSet.load(out)
+    assert 0 < len(rules) == json.loads(told)["rules"] < 16
+    assert all(rule.held_out is not None and rule.held_out.low >= 0.8 for rule in rules)
+    assert json.loads(told)["freedom"] > 0.38  # of those that are left
 
 
 @pytest.mark.parametrize("options", [("--support", "0.002"), ("--setting", "filtered")])

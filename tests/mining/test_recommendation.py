@@ -118,7 +118,8 @@ def test_one_action_dimension_is_recommended_for_alone(two_actions):
         assert one.rules == alone.rule_count
         only = CrossFit(
             tuple(Fold((fold.trees[dimension],), (fold.counts[dimension],)) for fold in fit.folds),
-            whole_episodes=True,
+            True,
+            fit.parted,
         )
         assert one.fidelity == pytest.approx(only.at(at).fidelity.share)
         assert one.coverage == pytest.approx(only.at(at).coverage.share)

@@ -19,7 +19,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_core.mining.validation.episode_counts import Influence
-from sarl_core.mining.validation.holding_out import Shortfall, best_lower_bound
+from sarl_core.mining.validation.holding_out import Shortfall, Verdict, best_lower_bound
 
 
 class Tried(NamedTuple):
@@ -57,7 +57,7 @@ def describe_tried(rule_set: RuleSet, tried: Tried) -> dict[str, Any]:
         A document for JSON.
     """
     fidelity = tried.judged.fidelity
-    counts = verdict_counts(rule_set.rules, rule_set.thresholds.confidence)
+    counts = _verdicts(rule_set)
     return {
         "share": tried.share,
         "seed": tried.seed,
@@ -93,17 +93,17 @@ def _described_short(tried: Tried) -> dict[str, Any]:
     }
 
 
-def describe_judged(judged: Judged, rule_set: RuleSet) -> dict[str, Any]:
+def describe_judged(judged: Judged, fidelity: float) -> dict[str, Any]:
     """What a rule set is worth on episodes that it was not mined from.
 
     Args:
         judged: Cross-fitted.
-        rule_set: Mined from all of them.
+        fidelity: Of the rules that were mined from all of them, there.
 
     Returns:
         A document for JSON.
     """
-    warning = parting_text(rule_set.fidelity, judged)
+    warning = parting_text(fidelity, judged)
     return {
         "folds": judged.folds,
         "whole_episodes": judged.whole_episodes,
@@ -149,11 +149,15 @@ def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
         facts.append(("lower bound", shortfall_text(tried.short)))
     if not len(rule_set):
         return facts
-    counts = verdict_counts(rule_set.rules, rule_set.thresholds.confidence)
+    counts, least = _verdicts(rule_set), "the minimum confidence"
+    if rule_set.forbids:
+        never = share_text(1.0 - (rule_set.thresholds.never or 0.0))
+        alone = all(rule.forbids for rule in rule_set.rules)
+        least = never if alone else f"{least} ({never} if they forbid)"
     facts.append(
         (
             "by rule",
-            f"{counts['reached']:,} reach the minimum confidence with their whole interval, "
+            f"{counts['reached']:,} reach {least} with their whole interval, "
             f"{counts['open']:,} open, {counts['below']:,} below it, {counts['unknown']:,} met in "
             "too few of these episodes",
         )
@@ -161,11 +165,25 @@ def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
     return facts
 
 
-def none_left(tried: Tried | None) -> str:
+def _verdicts(rule_set: RuleSet) -> dict[Verdict, int]:
+    """How many rules have each verdict, by what they were mined at.
+
+    A rule that forbids says that the expert does otherwise in all but epsilon of its states.
+    """
+    at = rule_set.thresholds
+    forbidding = [rule for rule in rule_set.rules if rule.forbids]
+    demanding = [rule for rule in rule_set.rules if not rule.forbids]
+    counts = verdict_counts(demanding, at.confidence)
+    others = verdict_counts(forbidding, 1.0 - (at.never or 0.0))
+    return {name: count + others[name] for name, count in counts.items()}
+
+
+def none_left(tried: Tried | None, *, forbids: bool = False) -> str:
     """What to do where no rule is left.
 
     Args:
         tried: Which episodes were held out, if any were.
+        forbids: Whether rules that forbid were wanted.
 
     Returns:
         A sentence.
@@ -175,6 +193,8 @@ def none_left(tried: Tried | None) -> str:
         remedy = remedy_text(tried.short, tried.there, in_command=True)
     if remedy:
         return f"No rule reaches the lower bound: {remedy}."
+    if forbids:
+        return "No rule reaches these thresholds; lower the support, or raise epsilon."
     return "No rule reaches these thresholds; lower one of them."
 
 
@@ -230,7 +250,8 @@ def rule_line(rule: Rule, rule_set: RuleSet) -> str:
     """A rule in words, with its counts where episodes were held out."""
     if rule.held_out is None:
         return sentence(rule, rule_set)
-    text = f"{sentence(rule, rule_set, evidence=False)[:-1]}: {evidence_text(rule)}"
+    did = "the expert did not in " if rule.forbids else ""
+    text = f"{sentence(rule, rule_set, evidence=False)[:-1]}: {did}{evidence_text(rule)}"
     if not rule.held_out.samples:
         return f"{text}."
     return f"{text}, {held_out_interval_text(rule.held_out)}."

@@ -321,7 +321,11 @@ def describe_rules(
             for index, action in enumerate(rule_set.actions)
         },
         **({"held_out": describe_tried(rule_set, tried)} if tried is not None else {}),
-        **({"cross_fitted": describe_judged(judged, rule_set)} if judged is not None else {}),
+        **(
+            {"cross_fitted": describe_judged(judged, (leeway or rule_set).fidelity)}
+            if judged is not None
+            else {}
+        ),
     }
 
 
@@ -373,7 +377,7 @@ def print_rules(
             f"{share_text((leeway or rule_set).coverage)} of the demonstrated states have a rule",
         ),
     ]
-    if leeway is not None:
+    if leeway is not None and len(rule_set):
         facts += [
             ("fidelity", f"{share_text(leeway.fidelity)} of these are as the rules say"),
             ("freedom", f"{share_text(leeway.freedom)} of the choice is left there"),
@@ -389,9 +393,10 @@ def print_rules(
     terminal.print_lines([f"Wrote {path}"])
     terminal.print_facts(facts)
     others = [one for one in (judged, tried and tried.judged) if one is not None]
-    warnings = [text for one in others if (text := parting_text(rule_set.fidelity, one))]
+    fidelity = (leeway or rule_set).fidelity
+    warnings = [text for one in others if (text := parting_text(fidelity, one))]
     terminal.print_lines([f"warning: {text}" for text in warnings[:1]])
-    if not others and len(rule_set) and leeway is None:
+    if not others and len(rule_set):
         terminal.print_lines(
             [
                 "Coverage and fidelity are of the states that the rules were mined from, which "
@@ -399,7 +404,7 @@ def print_rules(
             ]
         )
     if not len(rule_set):
-        terminal.print_lines([none_left(tried)])
+        terminal.print_lines([none_left(tried, forbids=leeway is not None)])
         return
     often = sorted(rule_set.rules, key=lambda rule: -rule.samples)[:_MOST_RULES]
     terminal.print_lines(["", "The rules that apply most often:"])

@@ -121,6 +121,8 @@ def _evidence(rule: Rule, *, held_out: bool, forbids: bool) -> list[str]:
     if held_out:
         counts = rule.held_out
         text = "–" if counts is None or not counts.samples else held_out_text(counts)
+        if forbids and text != "–":
+            text = f"{'did not in' if rule.forbids else 'did so in'} {text}"
         cells.append(
             f"{text} ({held_out_interval_text(counts)})" if counts and counts.episodes else text
         )

@@ -11,7 +11,7 @@ them there is `hold_out` alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
@@ -29,7 +29,12 @@ from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import Learner, PolicyTree
-from sarl_core.mining.validation.episode_counts import Influence, count_nodes, most_influential
+from sarl_core.mining.validation.episode_counts import (
+    Influence,
+    count_nodes,
+    count_together,
+    most_influential,
+)
 from sarl_core.processes import run_each
 from sarl_core.progress import Progress
 
@@ -91,10 +96,12 @@ class CrossFit:
         folds: Each with other episodes; together, all there are.
         whole_episodes: Whether these are episodes; else there was one only, and they are
             stretches of it, which are alike.
+        parted: The pairs, in these episodes.
     """
 
     folds: tuple[Fold, ...]
     whole_episodes: bool
+    parted: Demonstrations
 
     def at(self, thresholds: Thresholds) -> Judged:
         """What is known of the rules at some thresholds.
@@ -105,7 +112,25 @@ class CrossFit:
         Returns:
             The same as mining at them once for each fold gives.
         """
-        judged = [fold.at(thresholds) for fold in self.folds]
+        return self._together([fold.at(thresholds) for fold in self.folds])
+
+    def of(self, mine: Callable[[Sequence[PolicyTree]], RuleSet]) -> Judged:
+        """What is known of rules of any kind, such as those that forbid.
+
+        Args:
+            mine: Mines them from trees, one an action dimension.
+
+        Returns:
+            As `at`; it is called once for each fold.
+        """
+        return self._together(
+            [
+                judge_pairs(mine(fold.trees), self.parted.select(fold.counts[0].numbers))
+                for fold in self.folds
+            ]
+        )
+
+    def _together(self, judged: list[Judged]) -> Judged:
         return Judged(
             numbers=np.concatenate([one.numbers for one in judged]),
             lengths=np.concatenate([one.lengths for one in judged]),
@@ -189,6 +214,30 @@ def judge(rule_set: RuleSet, counts: EpisodeCounts) -> Judged:
     )
 
 
+def judge_pairs(rule_set: RuleSet, held_out: Demonstrations) -> Judged:
+    """The same of rules that may overlap, as those that forbid do.
+
+    Args:
+        rule_set: Any rules; those that demand do not overlap.
+        held_out: Pairs of other episodes.
+
+    Returns:
+        What these episodes say of it.
+
+    Raises:
+        InputError: If the rules are for other features or actions.
+    """
+    covered, correct = count_together(rule_set, held_out)
+    lengths = held_out.episode_lengths
+    return Judged(
+        numbers=held_out.episodes[held_out.episode_starts],
+        lengths=lengths,
+        decisions=lengths * len(rule_set.actions),
+        covered=covered,
+        correct=correct,
+    )
+
+
 def cross_fit(
     demonstrations: Demonstrations,
     *,
@@ -243,7 +292,7 @@ def cross_fit(
         executor=executor,
         progress=progress,
     )
-    return CrossFit(tuple(fitted), whole)
+    return CrossFit(tuple(fitted), whole, parted)
 
 
 def fold_of(

@@ -40,6 +40,42 @@ def count_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> EpisodeCou
     return count_applied(len(rule_set.rules), applied.rule, applied.row, right, demonstrations)
 
 
+def count_together(rule_set: RuleSet, demonstrations: Demonstrations) -> tuple[Integers, Integers]:
+    """Try all rules together on pairs, also where several apply at once.
+
+    A pair is right in an action dimension if it is as every rule says that has a say there: behind
+    one that demands, rules that forbid have none.
+
+    Args:
+        rule_set: Rules that demand do not overlap, as mined ones do not.
+        demonstrations: N pairs, in E episodes.
+
+    Returns:
+        Pairs of each episode to which a rule applies, and those of them that are right, (E,) each;
+        each pair counts once an action dimension.
+
+    Raises:
+        InputError: If the rules are for other features or actions.
+    """
+    labels = labels_of(rule_set, demonstrations)
+    applied = applications(rule_set, demonstrations.raw_observations)
+    dimension = np.array([rule.dimension for rule in rule_set.rules], dtype=np.int64)
+    forbids = np.array([bool(rule.forbids) for rule in rule_set.rules], dtype=np.bool_)
+    row, column, behind = applied.row, dimension[applied.rule], forbids[applied.rule]
+    right = obeying_labels(rule_set)[applied.rule, labels[row, column]]
+    demanded, covered, broken = np.zeros((3, *labels.shape), dtype=np.bool_)
+    demanded[row[~behind], column[~behind]] = True
+    says = ~behind | ~demanded[row, column]
+    covered[row[says], column[says]] = True
+    broken[row[says & ~right], column[says & ~right]] = True
+    episode, episodes = episode_of_each(demonstrations), demonstrations.n_episodes
+    samples, correct = (
+        np.bincount(episode, which.sum(axis=1), minlength=episodes).astype(np.int64)
+        for which in (covered, covered & ~broken)
+    )
+    return samples, correct
+
+
 def count_applied(
     size: int,
     subject: Integers,
