@@ -118,7 +118,11 @@ def _decides_otherwise(episodes: Episodes, shield: Shield, index: int) -> NDArra
     otherwise = np.zeros(len(episodes), dtype=np.bool_)
     steps = episodes.steps
     assert steps is not None
-    rows = np.flatnonzero((steps.rules == index).any(axis=1))
+    rules = shield.rule_set.rules
+    # A rule that forbids also has a say in what comes in the place of what another one forbids.
+    forbids = np.array([bool(rules[index].forbids and rule.forbids) for rule in rules] + [False])
+    in_force = steps.rules[:, rules[index].dimension]
+    rows = np.flatnonzero((in_force == index) | forbids[in_force])
     if len(rows):
         others = without_rule(shield, index)
         decided = others.decide_batch(steps.observation[rows], steps.proposed[rows])

@@ -523,9 +523,14 @@ class Shield:
         """The rules in whose place another may apply when they are taken out.
 
         Rules that demand and were mined from one tree never overlap, so where one is taken out,
-        none applies; of never-rules this says nothing.
+        none applies, unless others forbid something there; those overlap.
         """
-        return tuple(index for matcher in self._matchers for index in matcher.scanned)
+        tried = {index for matcher in self._matchers for index in matcher.scanned}
+        return tuple(
+            index
+            for index, rule in enumerate(self._rules)
+            if index in tried or (rule.enabled and self._forbidding[rule.dimension] is not None)
+        )
 
     def freedom(
         self, observations: NDArray[np.float32], rules: NDArray[np.int64]

@@ -185,10 +185,11 @@ class Ablation:
         """One row a rule that was taken out.
 
         Returns:
-            Columns `rule` (its id), `action` (its label), `verdict`, `steps_in_force`,
-            `steps_changed`, `episodes`, `episodes_that_differ`, `return_difference`, `low`, `high`,
-            `failures_with`, `failures_without`, `cut_with`, `cut_without` (episodes that were cut
-            off), `return_p`, `failure_p`; where failures are not known, theirs are empty.
+            Columns `rule` (its id), `action` (its label, or the first that it forbids), `verdict`,
+            `steps_in_force`, `steps_changed`, `episodes`, `episodes_that_differ`,
+            `return_difference`, `low`, `high`, `failures_with`, `failures_without`, `cut_with`,
+            `cut_without` (episodes that were cut off), `return_p`, `failure_p`; where failures are
+            not known, theirs are empty.
         """
         import pandas as pd
 
@@ -197,7 +198,7 @@ class Ablation:
             [
                 {
                     "rule": rules[effect.rule].id,
-                    "action": rules[effect.rule].action,
+                    "action": rules[effect.rule].label,
                     "verdict": effect.verdict,
                     "steps_in_force": effect.matched,
                     "steps_changed": effect.changed,

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from sarl_core.agents.agent import Agent
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, require_whole
-from sarl_core.mining.rule_set import require_demands
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, join
@@ -325,7 +324,6 @@ def ablate(
         ("max_steps", MAX_STEPS if max_steps is None else max_steps, 1),
     ):
         require_whole(name, value, least)
-    require_demands(shield.rule_set, "taking rules out one by one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     record = AblationRecord(env_id, actor, shield, seed, max_steps)
     runner = partial(run_tasks, executor=executor_of(jobs, executor))

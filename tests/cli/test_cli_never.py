@@ -134,18 +134,29 @@ def test_they_are_held_against_a_log(typed, tmp_path, options):
     assert len(pd.read_csv(folder / "rules.csv")) == len(rules)
 
 
-@pytest.mark.parametrize("command", ["report", "diff", "ablate"])
+@pytest.mark.parametrize("command", ["report", "diff"])
 def test_where_they_are_not_understood_that_is_said(typed, tmp_path, command):
     out = tmp_path / "never.json"
     assert typed("mine", CART, "--never", "0.1", "--out", str(out))[0] == 0
     arguments = {
         "report": (str(out), "--demonstrations", CART, "--out", str(tmp_path / "report.html")),
         "diff": (str(out), str(out)),
-        "ablate": ("--env", "CartPole-v1", "--agent", "novice", "--rules", str(out)),
     }[command]
     code, _, error = typed(command, *arguments)
     assert code == 2
     assert "some of these forbid one" in error
+
+
+def test_they_are_taken_out_one_by_one(typed, tmp_path):
+    out = tmp_path / "never.json"
+    assert typed("mine", CART, "--never", "0.1", "--support", "0.02", "--out", str(out))[0] == 0
+    arguments = ("--env", "CartPole-v1", "--agent", "novice", "--rules", str(out), "--seed", "500")
+    code, told, _ = typed("ablate", *arguments, "--episodes", "3", "--json")
+    assert code == 0
+    document = json.loads(told)
+    ids = [rule["rule"] for rule in document["rules"]] + document["without_difference"]
+    assert sorted(ids) == sorted(rule.id for rule in RuleSet.load(out))
+    assert any(rule["steps_changed"] for rule in document["rules"])
 
 
 def test_a_learner_chooses_from_what_they_leave(typed, tmp_path):

@@ -177,3 +177,43 @@ def test_what_rules_leave_is_counted_in_the_pairs():
     leeway = leeway_of(rules, walk())
     assert (leeway.coverage, leeway.fidelity) == (1.0, 1.0)
     assert leeway.freedom == pytest.approx(np.log(2) / np.log(3))
+
+
+def test_each_action_dimension_has_rules_of_its_own():
+    rng = np.random.default_rng(4)
+    states = rng.uniform(-1, 1, (3_000, 2)).astype(np.float32)
+    actions = rng.integers(0, 2, states.shape) + (states <= 0)
+    names = (("a", "b", "c"), ("d", "e", "f"))
+    shown = Demonstrations(states, actions, np.arange(3_000) // 100, label_names=names)
+    rules = mine_never_rules(shown, epsilon=0.05, supp_min=0.1)
+    shield = Shield(rules)
+    assert {rule.dimension for rule in rules} == {0, 1}
+    pairs = np.array([(first, second) for first in range(3) for second in range(3)])
+    seen, proposed = np.repeat(states[:30], 9, axis=0), np.tile(pairs, (30, 1))
+    together = shield.decide_batch(seen, proposed)
+    freedom = shield.freedom(seen, together.rules)
+    for row, (state, action) in enumerate(zip(seen, proposed, strict=True)):
+        alone = shield.decide(state, action)
+        expected = [ruled(rules, state, int(action[one]), one) for one in range(2)]
+        assert alone.rules == tuple(rule for rule, _, _ in expected)
+        assert alone.executed.tolist() == [label for _, label, _ in expected]
+        assert together.executed[row].tolist() == alone.executed.tolist()
+        assert together.intervened[row] == alone.intervened == (alone.executed != action).any()
+        left = [np.log(allowed) / np.log(3) for _, _, allowed in expected]
+        assert freedom[row] == pytest.approx(np.mean(left))
+
+
+def test_of_several_continuous_actions_only_what_is_forbidden_is_moved():
+    rng = np.random.default_rng(5)
+    states = rng.uniform(-1, 1, (3_000, 2)).astype(np.float32)
+    actions = (rng.uniform(0, 1, states.shape) - (states <= 0)).astype(np.float32)
+    bounds = {"action_low": (-1, -1), "action_high": (1, 1)}
+    shown = Demonstrations(states, actions, np.arange(3_000) // 100, **bounds)
+    shield = Shield(mine_never_rules(shown, epsilon=0.05, supp_min=0.1, divider=2))
+    state = np.array([-0.5, 0.5], dtype=np.float32)
+    for action, changed in (((-0.3, 0.3), ()), ((0.3, 0.3), (0,)), ((0.3, -0.3), (0, 1))):
+        proposed = np.array(action, dtype=np.float32)
+        decision = shield.decide(state, proposed)
+        assert tuple(np.flatnonzero(decision.executed != proposed)) == changed
+        together = shield.decide_batch(state[None], proposed[None])
+        assert together.executed[0].tolist() == decision.executed.tolist()

@@ -13,9 +13,18 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import ttest_1samp
 
-from sarl_core import InputError, RuleSet, Shield, load_demonstrations, mine_rules, rollout
+from sarl_core import (
+    InputError,
+    RuleSet,
+    Shield,
+    grow_policy_trees,
+    load_demonstrations,
+    mine_rules,
+    rollout,
+)
 from sarl_core.agents.agent import Agent
 from sarl_core.errors import WorkError
+from sarl_core.mining.never.never_rules import mine_never_rules, with_never_rules
 from sarl_core.processes import Processes
 from sarl_core.progress import CancelledError
 from sarl_core.rollouts.rule_use import RuleUse, rule_use
@@ -54,6 +63,19 @@ def torque() -> RuleSet:
     return mine_rules(load_demonstrations(DATA / "pendulum.parquet"), supp_min=0.05, conf_min=0.8)
 
 
+def forbidding() -> RuleSet:
+    """Rules that forbid intervals, several of them in one state."""
+    shown = load_demonstrations(DATA / "pendulum.parquet")
+    return mine_never_rules(shown, epsilon=0.2, supp_min=0.02, divider=5)
+
+
+def behind_demands() -> RuleSet:
+    """Rules that forbid intervals where those that demand one say nothing."""
+    trees = grow_policy_trees(load_demonstrations(DATA / "pendulum.parquet"), divider=3)
+    demanding = mine_rules(trees, supp_min=0.05, conf_min=0.9)
+    return with_never_rules(demanding, trees, 0.2)
+
+
 def by_brute_force(env_id: str, shield: Shield, rule: int, episodes: int, seed: int) -> object:
     rules = tuple(one for index, one in enumerate(shield.rule_set.rules) if index != rule)
     others = Shield(replace(shield.rule_set, rules=rules), projection=shield.projection)
@@ -67,8 +89,10 @@ def by_brute_force(env_id: str, shield: Shield, rule: int, episodes: int, seed: 
         ("CartPole-v1", overlapping),
         ("CartPole-v1", of_no_tree),
         ("Pendulum-v1", torque),
+        ("Pendulum-v1", forbidding),
+        ("Pendulum-v1", behind_demands),
     ],
-    ids=["mined", "overlapping", "of no tree", "continuous"],
+    ids=["mined", "overlapping", "of no tree", "continuous", "forbidding", "behind demands"],
 )
 def test_every_rule_is_what_running_without_it_gives(env_id: str, rules: object) -> None:
     shield = Shield(rules())  # type: ignore[operator]
