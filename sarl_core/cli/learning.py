@@ -63,6 +63,14 @@ def learn(
         int, typer.Option("--seeds", min=1, help="How many learners: seed, seed + 1 and so on.")
     ] = 1,
     projection: ProjectionName = "centre",
+    penalty: Annotated[
+        float | None,
+        typer.Option(
+            "--penalty",
+            help="What every replaced action costs the arm penalty, in points of reward.",
+            show_default="1",
+        ),
+    ] = None,
     episodes: Annotated[
         int,
         typer.Option(
@@ -121,6 +129,7 @@ def learn(
             max_steps,
             choose,
             None if agent is None else read_agent(agent, env, normalise),
+            penalty,
         )
         notes = plan.notes
     with terminal.working("Learning") as advance, _stopping(watched) as stopped:

@@ -77,7 +77,7 @@ _ALL = (
     LearningArm(
         "penalty",
         "Override with penalty",
-        "As override, and every replaced action costs one point of reward.",
+        "As override, and every replaced action costs reward, one point if nothing else is said.",
         penalty=1.0,
     ),
     LearningArm(

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,7 @@ from sarl_core.progress import CancelledError, Progress
 from sarl_core.rollouts.choices import Choice, check_choice
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
+from sarl_core.shielding.wrappers import check_penalty
 
 MAX_STEPS = 10_000_000  # of a run; a mistyped zero shall not work for a week
 _LOST = "a process that let somebody learn ended unexpectedly; run the same order again"
@@ -72,6 +73,8 @@ class LearningPlan:
         choose: What comes first where the best way to learn is chosen.
         agent: Whom the learners are compared with: it plays the episodes by which they are judged;
             None for nobody.
+        penalty: What every replaced action costs the arm that learns with a penalty, in points of
+            reward; what the arm says where None.
     """
 
     env_id: EnvironmentOrId
@@ -84,6 +87,7 @@ class LearningPlan:
     max_steps: int | None = None
     choose: Choice = "return"
     agent: Agent | None = None
+    penalty: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse what cannot be learned.
@@ -102,6 +106,13 @@ class LearningPlan:
             raise InputError(f"episodes is {self.episodes} and must be at least 1")
         if self.max_steps is not None and self.max_steps < 1:
             raise InputError(f"max_steps is {self.max_steps} and must be at least 1")
+        if self.penalty is not None:
+            check_penalty(self.penalty)
+            if not any(arm.penalty for arm in self.arms):
+                raise InputError(
+                    f"a penalty of {self.penalty:g} is given and no arm learns with one; choose "
+                    "the arm penalty, or leave it out"
+                )
         check_choice(self.choose, self.env_id)
         for arm in self.arms:
             for seed in (min(self.seeds), max(self.seeds)):
@@ -118,6 +129,7 @@ class LearningPlan:
     def settings(self) -> dict[str, Any]:
         """What the runs share and what was asked for, ready for JSON."""
         rules = self.rules
+        forbidding = 0 if rules is None else sum(bool(rule.forbids) for rule in rules.rules)
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -132,6 +144,7 @@ class LearningPlan:
             "arms": [arm.name for arm in self.arms],
             "seeds": list(self.seeds),
             "projection": self.projection,
+            "penalty": self.penalty,
             "trial_episodes": self.episodes,
             "trial_max_steps": self.max_steps,
             "choose": self.choose,
@@ -145,6 +158,7 @@ class LearningPlan:
                 "confidence": rules.thresholds.confidence,
                 "demonstrations": rules.source.digest,
                 **({} if rules.cut == "thresholds" else {"cut": rules.cut}),
+                **({"forbidding": forbidding} if forbidding else {}),
             },
         }
 
@@ -256,6 +270,8 @@ def _at_once(
 
 def _learned(plan: LearningPlan, seed: int, arm: LearningArm, **meanwhile: Any) -> LearningResult:
     """One run to its end, with what `learn` takes to be watched and taken up again."""
+    if plan.penalty is not None and arm.penalty:
+        arm = replace(arm, penalty=plan.penalty)
     return learn(
         plan.env_id,
         plan.rules,

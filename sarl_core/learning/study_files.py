@@ -362,6 +362,7 @@ class _Plan(Struct):
     arms: tuple[str, ...]
     seeds: tuple[Count, ...]
     trial_episodes: Count
+    penalty: float | None = None
 
 
 class _StoredRun(Struct):

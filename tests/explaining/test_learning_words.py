@@ -62,6 +62,15 @@ def study() -> LearningStudy:
     )
 
 
+def test_rules_that_forbid_and_a_penalty_stand_in_the_conditions(study: LearningStudy) -> None:
+    forbidding = {"rules": {**RULES, "forbidding": RULES["count"]}, "penalty": 5.0}
+    told = replace(study, settings={**study.settings, **forbidding})
+    last = finding(told, summarise_study(told))[-1]
+    assert f"{RULES['count']:,} never-rules, a penalty of 5 where there is one, 1,000 steps" in last
+    told = replace(study, settings={**study.settings, "rules": {**RULES, "forbidding": 1}})
+    assert "; 1 of them forbid), 1,000 steps" in finding(told, summarise_study(told))[-1]
+
+
 def test_the_best_arm_is_named_first_with_its_numbers(study: LearningStudy) -> None:
     answer = finding(study, summarise_study(study))[0]
     assert answer.startswith("Safe while learning and good afterwards: “Imitate, then hand over”.")

@@ -14,6 +14,7 @@ import pytest
 from stable_baselines3 import PPO
 
 from sarl_core import InputError, RuleSet, WorkError, load_demonstrations, mine_rules
+from sarl_core.agents.mlp_policy import MlpPolicy
 from sarl_core.learning.arms import ARMS, arms_named
 from sarl_core.learning.curves import Columns, Trial
 from sarl_core.learning.run import LearningResult, learn
@@ -23,6 +24,7 @@ from sarl_core.learning.study_files import (
     LearningStudy,
     load_run,
     load_study,
+    policy_path,
     save_run,
 )
 from sarl_core.learning.summary import best, reference, summarise_study
@@ -144,6 +146,8 @@ def test_a_folder_that_cannot_be_made_is_said(plan: LearningPlan, tmp_path: Path
         ({"episodes": 0}, "episodes is 0"),
         ({"seeds": (0, 90)}, "seed is 90"),  # it would see what all are tried on
         ({"env_id": "LunarLander-v3"}, "4 features"),
+        ({"penalty": 2.0}, "no arm learns with one"),
+        ({"penalty": np.nan}, "the penalty is nan"),
     ],
 )
 def test_a_plan_that_cannot_be_learned_is_refused(
@@ -151,6 +155,24 @@ def test_a_plan_that_cannot_be_learned_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=fragment):
         replace(plan, **change)  # type: ignore[arg-type]
+
+
+def test_a_penalty_is_what_was_said_and_stands_in_the_study(
+    plan: LearningPlan, tmp_path: Path
+) -> None:
+    alike = replace(plan, arms=arms_named(["override", "penalty"]), seeds=(0,), penalty=0.0)
+    learned = {}
+    for place, penalty in enumerate((0.0, 50.0)):
+        folder = tmp_path / str(place)
+        study = run_study(replace(alike, penalty=penalty), folder)
+        assert study.settings["penalty"] == penalty
+        learned[penalty] = [
+            MlpPolicy.load(policy_path(folder, arm, 0)).weights[-1] for arm in alike.arms
+        ]
+    assert np.array_equal(*learned[0.0])
+    assert not np.array_equal(*learned[50.0])
+    with pytest.raises(InputError, match="another penalty"):
+        run_study(replace(alike, penalty=1.0), tmp_path / "1")
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{", '{"format": "other"}', "\ud7ff"])

@@ -354,7 +354,13 @@ def _conditions(study: LearningStudy) -> str:
             else f"support {limit_text(rules['support'])}, confidence "
             f"{limit_text(rules['confidence'])}"
         )
-        by = f"{counted(int(rules['count']), 'rule')} ({cut})"
+        count, forbidding = int(rules["count"]), int(rules.get("forbidding") or 0)
+        if forbidding:
+            cut = f"{cut}; {forbidding:,} of them forbid"
+        by = f"{counted(count, 'rule')} ({cut})" if forbidding < count else f"{count:,} never-rules"
+    penalty = study.settings.get("penalty")
+    if penalty is not None:
+        by = f"{by}, a penalty of {penalty:g} where there is one"
     seeds = len(study.seeds)
     meant = ""
     if study.failures_known:
