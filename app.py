@@ -17,7 +17,10 @@ from threading import Thread
 import streamlit as st
 
 from sarl_core.files import temporary_folder
+from sarl_dashboard.serving.log_lines import write_json_lines
+from sarl_dashboard.serving.routes import routes
 
+write_json_lines()
 _while_it_runs = ExitStack()
 _while_it_runs.enter_context(temporary_folder())
 atexit.register(_while_it_runs.close)
@@ -31,4 +34,4 @@ sys.path.append(str(_PAGES))
 # Importing what grows trees takes as long as a browser takes to begin.
 Thread(target=import_module, args=("sklearn.tree",), daemon=True).start()
 
-app = st.App(_PAGES / "_router.py")
+app = st.App(_PAGES / "_router.py", routes=routes())

@@ -11,6 +11,7 @@ from sarl_dashboard.components.journey.brand import ICON, show_logo
 from sarl_dashboard.components.journey.first_run import show_first_run, take_up
 from sarl_dashboard.components.journey.growing import require_trees
 from sarl_dashboard.components.journey.next_step import next_step
+from sarl_dashboard.components.journey.sign_in import is_admitted, show_sign_in, show_signed_in
 from sarl_dashboard.components.journey.words import words_button
 from sarl_dashboard.components.sidebar import (
     require_data,
@@ -92,7 +93,17 @@ aliases = [
     for path, title in ALIASES.items()
 ]
 bring_along(threshold_parameters())
-page = st.navigation(SECTIONS | {"Start": [*SECTIONS["Start"], *aliases]}, expanded=True)
+admitted = is_admitted()
+page = st.navigation(
+    SECTIONS | {"Start": [*SECTIONS["Start"], *aliases]},
+    position="sidebar" if admitted else "hidden",
+    expanded=True,
+)
+if not admitted:
+    st.html(style_sheet())
+    show_logo()
+    show_sign_in()
+    st.stop()
 if page in aliases:
     meant = next(other for other in PAGES if other.title == page.title)
     st.switch_page(meant, query_params=st.query_params.to_dict())
@@ -111,6 +122,7 @@ try:
     in_force.take_up()
     take_up()
     sidebar(with_thresholds=page.title != "Thresholds")
+    show_signed_in()
 finally:
     write_url()
 library.say()

@@ -7,11 +7,13 @@ import streamlit as st
 from sarl_core.errors import InputError, SarlError
 from sarl_dashboard.state import library
 from sarl_dashboard.text import refuse
+from sarl_dashboard.views.library.at_work import show_work
 from sarl_dashboard.views.library.chosen import show_chosen
 from sarl_dashboard.views.library.listing import choose_item, import_form, removed_items, room
 
 st.title("Library")
 st.caption("What you have made or uploaded is kept here: open it, share it, carry it elsewhere.")
+show_work(library.author())
 try:
     opened = library.library()
     item = choose_item(opened, library.author())

@@ -1,12 +1,14 @@
-"""What a session is: its theme, and what it loads for good."""
+"""What a session is: whose it is, its theme, and what it loads for good."""
 
 from __future__ import annotations
 
 import gc
+from contextlib import suppress
 from typing import NoReturn
 
+import psutil
 import streamlit as st
-from streamlit.runtime.scriptrunner import StopException
+from streamlit.runtime.scriptrunner import StopException, get_script_run_ctx
 
 
 @st.cache_resource(show_spinner=False)
@@ -23,6 +25,58 @@ def settle(page: str, modules: int) -> None:
     """
     gc.collect()
     gc.freeze()
+
+
+# --- whose it is --------------------------------------------------------------------------------
+
+_LONGEST_NAME = 200  # as the library has it
+
+
+def needs_sign_in() -> bool:
+    """Whether visitors sign in here: whether Streamlit's secrets name who vouches for them."""
+    return hasattr(st.user, "is_logged_in")
+
+
+def is_signed_in() -> bool:
+    """Whether this visitor has."""
+    return needs_sign_in() and bool(st.user.is_logged_in)
+
+
+def signed_in() -> str:
+    """The name of who has signed in, or the address; "" where nobody has, or there is neither.
+
+    What is kept is theirs by this. Two people of one name are told apart by their addresses, and
+    nobody can take a name that holds somebody's address.
+    """
+    if get_script_run_ctx() is None or not is_signed_in():
+        return ""
+    said = (str(st.user.get(key) or "").strip() for key in ("name", "email"))
+    unwanted = str.maketrans("", "", "<>")
+    name, email = ("".join(filter(str.isprintable, text)).translate(unwanted) for text in said)
+    if not (name and email):
+        return (name or email)[:_LONGEST_NAME]
+    return f"{name[: _LONGEST_NAME - len(email) - 3]} <{email}>"
+
+
+def visitor() -> str:
+    """What tells visitors apart, for what each may have: who has signed in, or else the browser."""
+    context = get_script_run_ctx()
+    if context is None:
+        return ""
+    return signed_in() or st.context.cookies.get("_streamlit_xsrf", "") or context.session_id
+
+
+# --- what it takes ------------------------------------------------------------------------------
+
+
+def memory_used() -> int:
+    """Bytes that the server and its processes take."""
+    server = psutil.Process()
+    total = 0
+    for process in (server, *server.children(recursive=True)):
+        with suppress(psutil.Error):  # gone meanwhile
+            total += process.memory_info().rss
+    return total
 
 
 # --- how it looks ------------------------------------------------------------------------------

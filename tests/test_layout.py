@@ -87,7 +87,7 @@ def test_what_the_product_imports_is_pinned_and_what_is_pinned_is_used():
     files = [
         path for path in python_files() if path.relative_to(ROOT).parts[0] in (*PRODUCT, "app.py")
     ]
-    by_name = {"kaleido", "imageio-ffmpeg", "highway-env", "psycopg"}
+    by_name = {"kaleido", "imageio-ffmpeg", "highway-env", "psycopg", "authlib", "httpx"}
     assert packages_of(imported(files)) - OPTIONAL | by_name == set(pins("requirements.txt"))
 
 

@@ -8,24 +8,17 @@ from __future__ import annotations
 
 import json
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import Any
 
-import msgspec
-
-from sarl_core.documents import MisfitError, conformed, parse_json
+from sarl_core.documents import conformed, parse_json
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError
-from sarl_core.limits import limited_bytes
 
 VARIABLE = "SARL_APP_OFFERS"
 """The environment variable of the server's process."""
 
 _TAKEN = ("novice", "untrained", "expert", "own file", "shipped", "nobody", "")
-_ADVICE = "write environments with an id each, and agents by name, as the guide shows"
 
 
 @dataclass(frozen=True)
@@ -81,61 +74,6 @@ class Offers:
     def of_process(cls) -> Offers:
         """What this process, a dashboard's, was started with."""
         return cls.from_text(os.environ.get(VARIABLE, ""))
-
-
-class _Environment(msgspec.Struct, forbid_unknown_fields=True):
-    id: str
-    arguments: dict[str, Any] = {}
-    wrappers: list[str] = []
-    failure: str = ""
-    cost: str = ""
-
-
-class _Settings(msgspec.Struct, forbid_unknown_fields=True):
-    environments: list[_Environment] = []
-    agents: dict[str, str] = {}
-
-
-def read_offers(path: Path) -> Offers:
-    """Read a settings file.
-
-    Args:
-        path: A ``.toml`` or ``.json`` file with `environments`, a list of tables (`id`, and if
-            needed `arguments`, `wrappers`, `failure`, `cost`), and `agents`, a table of names and
-            ``module:name``.
-
-    Returns:
-        What it offers.
-
-    Raises:
-        InputError: If it cannot be read, or holds something else.
-    """
-    try:
-        content = limited_bytes(path)
-        document: Any
-        if path.suffix.lower() == ".toml":
-            document = tomllib.loads(content.decode())
-        else:
-            document = parse_json(content)
-        settings = conformed(document, _Settings)
-    except MisfitError as error:
-        raise InputError(f"{path}: {error}; {_ADVICE}") from error
-    except (OSError, ValueError, InputError) as error:
-        reason = (isinstance(error, OSError) and error.strerror) or error
-        raise InputError(f"the settings {path} cannot be read ({reason}); {_ADVICE}") from error
-    return Offers(
-        tuple(
-            Environment(
-                one.id,
-                json.dumps(one.arguments, default=str),
-                tuple(one.wrappers),
-                one.failure,
-                one.cost,
-            )
-            for one in settings.environments
-        ),
-        tuple(settings.agents.items()),
-    )
 
 
 def named_agents(texts: Sequence[str]) -> Mapping[str, str]:

@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,6 +17,10 @@ from sarl_core.cli.options import ClusterAddress, Cost, EnvArguments, Failure, W
 from sarl_core.clusters import VARIABLE
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, WorkError
+
+if TYPE_CHECKING:
+    from sarl_core.agents.offers import Offers
+    from sarl_core.serving.settings import ServerSettings
 
 
 def app(
@@ -52,9 +56,11 @@ def app(
         typer.Option(
             "--settings",
             metavar="FILE",
+            envvar="SARL_SETTINGS",
             show_default=False,
             help="A .toml or .json file that says the same: environments, each with its id, "
-            "arguments, wrappers, failure and cost, and agents.",
+            "arguments, wrappers, failure and cost, and agents; and limits, how much visitors "
+            "may ask for.",
         ),
     ] = None,
     cluster: ClusterAddress = None,
@@ -63,9 +69,15 @@ def app(
 
     Example: `python -m sarl_core app --port 8600`
     """
+    from sarl_core.serving.limits import VARIABLE as LIMITS
+
     script = _script()
     with terminal.working("Starting"):
-        offers = _offers(env or [], env_args, wrapper or [], failure, cost, agent or [], settings)
+        said = _settings(settings)
+        offers = _offers(
+            env or [], env_args, wrapper or [], failure, cost, agent or [], said.offers
+        )
+        offers[LIMITS] = said.limits.to_text()
         if cluster is not None and cluster.startswith("local:"):
             raise InputError(
                 "a dashboard works in processes of this machine anyway; give the address of a "
@@ -78,7 +90,10 @@ def app(
                 offers[VARIABLE] = cluster
     terminal.print_lines([f"The dashboard is at http://localhost:{port} (Ctrl-C ends it)."])
     sys.stdout.flush()
-    command = [sys.executable, "-m", "streamlit", "run", str(script), "--server.port", str(port)]
+    command = [
+        *(sys.executable, "-m", "streamlit", "run", str(script), "--server.port", str(port)),
+        *("--server.maxUploadSize", str(said.limits.upload_mb)),
+    ]
     with subprocess.Popen(command, env=os.environ | offers) as server:
         try:
             code = server.wait()
@@ -89,6 +104,13 @@ def app(
         raise WorkError(f"the dashboard ended with code {code}; what it printed says why")
 
 
+def _settings(path: Path | None) -> ServerSettings:
+    """What the settings file says, where there is one."""
+    from sarl_core.serving.settings import ServerSettings, read_settings
+
+    return ServerSettings() if path is None else read_settings(path)
+
+
 def _offers(
     envs: list[str],
     env_args: str | None,
@@ -96,10 +118,10 @@ def _offers(
     failure: str | None,
     cost: str | None,
     agents: list[str],
-    settings: Path | None,
+    listed: Offers,
 ) -> dict[str, str]:
     """What visitors may use, tried, and handed to the server by a variable of its environment."""
-    from sarl_core.agents.offers import VARIABLE, Offers, named_agents, read_offers
+    from sarl_core.agents.offers import VARIABLE, Offers, named_agents
     from sarl_core.environments.description import describe_environment
     from sarl_core.environments.imports import named_object
     from sarl_core.environments.signals import check_signals
@@ -110,7 +132,6 @@ def _offers(
             "--env-args, --wrapper, --failure and --cost belong to one --env; for several, write "
             "them in a file and give it with --settings"
         )
-    listed = Offers() if settings is None else read_offers(settings)
     offers = Offers(
         (
             *listed.environments,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from urllib.parse import urlencode, urlsplit
 
 import streamlit as st
 
@@ -14,6 +13,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.state import edits, library, rule_base
 from sarl_dashboard.state import in_force as rules_in_force
 from sarl_dashboard.state.data import chosen_dataset, dataset_label, raw_demonstrations
+from sarl_dashboard.state.url import page_address
 from sarl_dashboard.text import refuse
 
 
@@ -88,7 +88,7 @@ def keep_result_button(
         made = content() if callable(content) else content
         about = [*beside(), *(name for name in names if library.is_id(name))]
         item = library.keep_result(
-            made.encode() if isinstance(made, str) else made, file, about, _address()
+            made.encode() if isinstance(made, str) else made, file, about, page_address()
         )
     except SarlError as error:
         refuse(error)
@@ -99,10 +99,3 @@ def keep_result_button(
         icon=":material/check:",
         query_params={"item": item.id},
     )
-
-
-def _address() -> str:
-    """Of this page, from where the dashboard begins."""
-    page = urlsplit(st.context.url or "").path.rsplit("/", 1)[-1]
-    parameters = {name: st.query_params.get_all(name) for name in st.query_params}
-    return f"{page}?{urlencode(parameters, doseq=True)}" if page else ""

@@ -72,6 +72,8 @@ def run_bar(
         return
     if offer is None:
         return
+    if place.find_again(offer.key):
+        st.rerun()
     with st.container(horizontal=True, vertical_alignment="center"):
         st.button(
             offer.label,

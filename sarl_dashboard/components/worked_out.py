@@ -36,7 +36,9 @@ def worked_out(
                 place,
                 Offer(
                     key=key,
-                    start=lambda: mining(key, work, lambda result: results.put(key, result)),
+                    start=lambda: mining(
+                        key, work, lambda result: results.put(key, result), lasts=True
+                    ),
                     about=hint,
                     complete=result is not None,
                     cancelled="Cancelled; nothing was kept.",

@@ -53,7 +53,12 @@ def ablating(wanted: Wanted) -> Job[AblationRecord]:
         wanted: What is asked for.
     """
     cache, executor = record_cache(), processes()
-    return Job(wanted.row.key, lambda job: _ablate(job, wanted, cache, executor), wanted.episodes)
+    return Job(
+        wanted.row.key,
+        lambda job: _ablate(job, wanted, cache, executor),
+        wanted.episodes,
+        lasts=True,
+    )
 
 
 def _ablate(

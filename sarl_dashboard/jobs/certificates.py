@@ -77,7 +77,10 @@ def certifying(wanted: WantedCertificate) -> Job[None]:
     """
     episodes, executor = results(), processes()
     return Job(
-        wanted.key, lambda job: _certify(job, wanted, episodes, executor), wanted.test.certified[0]
+        wanted.key,
+        lambda job: _certify(job, wanted, episodes, executor),
+        wanted.test.certified[0],
+        lasts=True,
     )
 
 

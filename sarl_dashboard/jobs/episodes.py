@@ -15,7 +15,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from threading import Lock
 from typing import Protocol
-from weakref import WeakSet
 
 import streamlit as st
 
@@ -31,6 +30,7 @@ from sarl_core.shielding.shield import Outside, Projection, Shield
 from sarl_dashboard.cache import key_of
 from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.processes import processes
+from sarl_dashboard.jobs.queue import queue
 from sarl_dashboard.state import library
 from sarl_dashboard.text import digest_of
 
@@ -183,24 +183,17 @@ def run_batch(rows: Sequence[Row], episodes: int) -> Job[EpisodeBatch]:
     """
     batch = EpisodeBatch(tuple({row.key: row for row in reversed(rows)}.values())[::-1], episodes)
     known_episodes, executor = results(), processes()
-    job = Job(
+    return Job(
         None,
         lambda job: _run(job, batch, known_episodes, executor),
         len(batch.rows) * episodes,
         batch,
+        lasts=True,
     )
-    _begun().add(job)
-    return job
-
-
-@st.cache_resource
-def _begun() -> WeakSet[Job[EpisodeBatch]]:
-    """The work of all sessions, as long as one of them or its thread knows it."""
-    return WeakSet()
 
 
 def take_up_work(place: Place[EpisodeBatch], rows: Sequence[Row]) -> None:
-    """Go on looking at work that was begun before this page was loaded anew.
+    """Go on looking at work that was begun before this page was loaded anew, or elsewhere.
 
     Args:
         place: Of the work.
@@ -209,9 +202,11 @@ def take_up_work(place: Place[EpisodeBatch], rows: Sequence[Row]) -> None:
     if place.job is not None:
         return
     keys = {row.key for row in rows}
-    for job in list(_begun()):
+    for job in (*queue().running, *queue().waiting):
         batch = job.result
-        if job.running and job.is_left and batch and keys & {row.key for row in batch.rows}:
+        if not isinstance(batch, EpisodeBatch) or not (job.running and job.is_own_or_left):
+            continue
+        if keys & {row.key for row in batch.rows}:
             place.take_up(job)
             return
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from concurrent.futures import Executor
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from threading import Lock
 
 import streamlit as st
 
@@ -34,12 +32,14 @@ from sarl_dashboard.cache import key_of
 from sarl_dashboard.jobs.episodes import AgentMaker
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.jobs.processes import processes
+from sarl_dashboard.jobs.queue import JobKind
 from sarl_dashboard.memory_cache import BoundedCache
 from sarl_dashboard.state import library
 from sarl_dashboard.text import digest_of
 
 MOST_OUTCOMES = 6  # a finished run holds up to some ten megabytes of demonstrations
 _KIND: Kind = "improvement"
+_RUNS = JobKind("runs of Improve")  # each takes minutes of all processors
 _SOON = 0.03  # share of the work from which on the rest can be guessed
 
 
@@ -155,47 +155,25 @@ def keep_outcome(outcome: Outcome) -> None:
     library.keep_work(_KIND, str(order.env_id), order.digest, contents, amount)
 
 
-@st.cache_resource
-def _one_at_a_time() -> Lock:
-    """Runs take minutes of all processors: one is finished sooner than two side by side."""
-    return Lock()
-
-
 def improving(order: ImprovementOrder) -> Job[Outcome]:
     """Improve rules, or find their gaps where there is nobody to ask.
 
     Args:
         order: What is asked for.
     """
-    cache, lock, executor = outcome_cache(), _one_at_a_time(), processes()
+    cache, executor = outcome_cache(), processes()
 
-    def in_turn(job: Job[Outcome]) -> None:
-        with _turn(job, lock) as mine:
-            if not mine:
-                return
-            run = _ImprovementRun(job, order, executor, time.monotonic())
-            outcome, finished = run.find_gaps() if order.expert is None else run.improve()
+    def work(job: Job[Outcome]) -> None:
+        run = _ImprovementRun(job, order, executor, time.monotonic())
+        outcome, finished = run.find_gaps() if order.expert is None else run.improve()
         job.result = outcome
         if finished:
             cache.put(order.key, outcome)
         with suppress(SarlError):  # here it is all the same; a page says that keeping fails
             keep_outcome(outcome)
 
-    return Job(order.key, in_turn, order.plan.rounds * order.plan.episodes, Outcome(order))
-
-
-@contextmanager
-def _turn(job: Job[Outcome], lock: Lock) -> Iterator[bool]:
-    """Wait for other visitors' runs; False where this one is no longer wanted by then."""
-    while not lock.acquire(timeout=0.3):
-        job.text = "Waiting until another run has ended …"
-        if not job.wanted():
-            yield False
-            return
-    try:
-        yield True
-    finally:
-        lock.release()
+    total = order.plan.rounds * order.plan.episodes
+    return Job(order.key, work, total, Outcome(order), lasts=True, kind=_RUNS)
 
 
 @dataclass

@@ -1,7 +1,8 @@
 """Long work that goes on beside the pages: they look in, show how far it is, and may call it off.
 
-The work belongs to the visitor's session. Other pages can be opened meanwhile; when the visitor has
-gone for good, it ends by itself.
+Other pages can be opened meanwhile. What a page needs for itself belongs to the visitor's session
+and ends by itself when the visitor has gone for good. What a visitor has asked for takes its turn
+among that of others, goes on when the page is closed, and is found again on the page Library.
 """
 
 from __future__ import annotations
@@ -19,9 +20,14 @@ from streamlit.runtime.scriptrunner import get_script_run_ctx
 
 from sarl_core.errors import SarlError, WorkError
 from sarl_core.progress import CancelledError
+from sarl_dashboard import session
 from sarl_dashboard.cache import BACK_WITHIN
+from sarl_dashboard.jobs.queue import JobKind, queue
+from sarl_dashboard.state import library
+from sarl_dashboard.state.url import page_address, page_title
 
 Result = TypeVar("Result")
+_LOOKED_EVERY = 0.3  # seconds, for one's turn
 
 
 class Job(Generic[Result]):
@@ -34,6 +40,14 @@ class Job(Generic[Result]):
         done: Units finished.
         text: What is being done.
         error: Why it ended early; None if it did not, or was called off.
+        lasts: Whether it takes its turn, and goes on without a page.
+        kind: What one visitor does one of at a time; None for anything else.
+        visitor: Who began it, for what each may have.
+        author: Whose the things are that it keeps.
+        page: Title of the page where it was begun.
+        address: Of that page, as it was then.
+        place: Name of the place on screen.
+        began: When it began, in seconds of `time.monotonic`.
     """
 
     def __init__(
@@ -42,8 +56,11 @@ class Job(Generic[Result]):
         work: Callable[[Job[Result]], None],
         total: int,
         result: Result | None = None,
+        *,
+        lasts: bool = False,
+        kind: JobKind | None = None,
     ) -> None:
-        """Start at once.
+        """Start: at once, or what lasts when it is its turn.
 
         Args:
             key: Of everything that its result depends on.
@@ -51,6 +68,8 @@ class Job(Generic[Result]):
                 there: it has no page to write to, and no session for caches.
             total: Units of work in all.
             result: What there is of it before it begins.
+            lasts: Whether it goes on when its page is closed.
+            kind: What one visitor does one of at a time; None for anything else.
         """
         self.key, self.result = key, result
         self.total, self.text = total, "Starting …"
@@ -58,6 +77,10 @@ class Job(Generic[Result]):
         self.error: SarlError | None = None
         self._work = work
         self._cancelled = self._finished = False
+        self.lasts, self.kind = lasts, kind
+        self.visitor, self.author = session.visitor(), library.author()
+        self.page, self.address, self.place = page_title(), page_address(), ""
+        self.began = time.monotonic()
         self.take_over()
         Thread(target=self._run, daemon=True, name="job").start()
 
@@ -94,6 +117,12 @@ class Job(Generic[Result]):
         except RuntimeError:  # there is no server whose visitor could leave
             return False
 
+    @property
+    def is_own_or_left(self) -> bool:
+        """Whether this visitor may look at it and call it off, from another page too."""
+        mine = self.visitor == session.visitor()
+        return self.author == library.author() and (mine or self.is_left)
+
     def take_over(self) -> None:
         """Let it belong to the visitor whose page this is."""
         context = get_script_run_ctx()
@@ -102,6 +131,8 @@ class Job(Generic[Result]):
 
     def wanted(self) -> bool:
         """Whether to go on; for the work itself."""
+        if self.lasts:
+            return not self._cancelled
         now = time.monotonic()
         if not self.is_left:
             self._seen = now
@@ -112,9 +143,22 @@ class Job(Generic[Result]):
         self.done, self.total = done, total
         return self.wanted()
 
+    def _wait(self) -> None:
+        """Wait for its turn, where it is one of those that take turns."""
+        if self.lasts:
+            queue().enter(self)
+            while obstacle := queue().obstacle(self):
+                self.text = obstacle
+                if not self.wanted():
+                    raise CancelledError
+                time.sleep(_LOOKED_EVERY)
+            self.text = "Starting …"
+
     def _run(self) -> None:
         try:
-            self._work(self)
+            with library.working_for(self.author):
+                self._wait()
+                self._work(self)
         except CancelledError:
             pass
         except SarlError as error:
@@ -124,6 +168,8 @@ class Job(Generic[Result]):
             self.error = WorkError("the work failed unexpectedly; the server's log says more")
         finally:
             self._finished = True
+            if self.lasts:
+                queue().leave(self)
 
 
 @dataclass(frozen=True)
@@ -154,7 +200,26 @@ class Place(Generic[Result]):
         """Begin work in the place of the one before, which is called off; for a callback too."""
         if self.job is not None:
             self.job.cancel()
-        st.session_state[f"_job_{self.name}"] = start()
+        job = st.session_state[f"_job_{self.name}"] = start()
+        job.place = self.name
+
+    def find_again(self, key: object) -> bool:
+        """Look at work that was begun here and left, where nothing was begun since.
+
+        Args:
+            key: Of what is looked at.
+
+        Returns:
+            Whether there is any.
+        """
+        if self.job is not None:
+            return False
+        for job in (*queue().running, *queue().waiting):
+            here = (job.place, job.key) == (self.name, key)
+            if here and job.running and job.is_own_or_left:
+                self.take_up(job)
+                return True
+        return False
 
     def take_up(self, job: Job[Result]) -> None:
         """Look at work that another page began and left."""

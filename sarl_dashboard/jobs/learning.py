@@ -40,15 +40,18 @@ from sarl_core.library.items import Kind
 from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rollouts.choices import Choice
+from sarl_core.serving.limits import ServerLimits
 from sarl_core.shielding.shield import Projection
 from sarl_core.shipped import DATA
 from sarl_dashboard.jobs.job import Job
+from sarl_dashboard.jobs.queue import JobKind
 from sarl_dashboard.state import library
 from sarl_dashboard.text import digest_of
 
 ROOT = Path(sarl_core.__file__).parents[1]  # where a process of its own finds the library
 STUDIES = DATA / "learning"
 MOST_TRAININGS = 2  # at once, of all visitors: each takes a core
+STUDIES_OF_LEARNING = JobKind("studies of learning", MOST_TRAININGS)
 MOST_FOLDERS = 24  # the oldest go first; one takes a few MB
 LEFT_ALONE = 6 * 3600.0  # seconds without a look before a folder may go
 PATIENCE = 30.0  # seconds that a process gets to save what it has learned
@@ -308,7 +311,12 @@ def learning(order: LearningOrder) -> Job[LearningStudy]:
     """
     everyone = trainings()
     return Job(
-        order.folder, lambda job: _wait(job, order, everyone), order.steps_in_all, _so_far(order)
+        order.folder,
+        lambda job: _wait(job, order, everyone),
+        order.steps_in_all,
+        _so_far(order),
+        lasts=True,
+        kind=STUDIES_OF_LEARNING,
     )
 
 
@@ -319,6 +327,12 @@ def _so_far(order: LearningOrder) -> LearningStudy | None:
 
 
 def _wait(job: Job[LearningStudy], order: LearningOrder, everyone: Trainings) -> None:
+    limits = ServerLimits.of_process()
+    if order.steps > limits.learning_steps or order.seeds > limits.learning_seeds:
+        raise InputError(
+            f"{order.steps:,} steps and {order.seeds} learners of each kind are more than this "
+            f"server takes, {limits.learning_steps:,} and {limits.learning_seeds}; ask for less"
+        )
     began, already = time.monotonic(), _steps_made(job.result)
     training = everyone.join(order)
     try:

@@ -24,13 +24,16 @@ def mining_results() -> BoundedCache[Any]:
     return BoundedCache(MOST_RESULTS)
 
 
-def mining(key: object, work: Work[Result], keep: Callable[[Result], None]) -> Job[Result]:
+def mining(
+    key: object, work: Work[Result], keep: Callable[[Result], None], *, lasts: bool = False
+) -> Job[Result]:
     """Mine in these processes.
 
     Args:
         key: Of what the result depends on.
         work: Gives the result.
         keep: Called with it.
+        lasts: Whether it goes on when its page is closed: whether somebody has asked for it.
     """
     executor = processes()
 
@@ -41,4 +44,4 @@ def mining(key: object, work: Work[Result], keep: Callable[[Result], None]) -> J
 
         keep(work(executor, progress))
 
-    return Job(key, mine, 1)
+    return Job(key, mine, 1, lasts=lasts)

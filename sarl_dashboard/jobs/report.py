@@ -67,7 +67,7 @@ def reporting(order: ReportOrder) -> Job[Report]:
         order: What is asked for.
     """
     cache = report_cache()
-    return Job(order.key, lambda job: _make(job, order, cache), 100)
+    return Job(order.key, lambda job: _make(job, order, cache), 100, lasts=True)
 
 
 def _make(job: Job[Report], order: ReportOrder, cache: BoundedCache[Report]) -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 from threading import Lock
 from typing import Any, cast
@@ -36,6 +37,7 @@ from sarl_core.mining.editing.edits import Edit
 from sarl_core.mining.rule_set import RuleSet, require_demands, rules_digest
 from sarl_core.rollouts.episode_files import episodes_from_json, episodes_to_json
 from sarl_core.rollouts.episodes import Episodes
+from sarl_dashboard import session
 from sarl_dashboard.cache import cached
 from sarl_dashboard.text import digest_of
 
@@ -43,6 +45,7 @@ _AMOUNT: dict[Kind, str] = {"episodes": "episodes", "improvement": "rounds", "st
 """How details call how much of some work is finished."""
 _OPENED: dict[LibraryPlace, Library] = {}
 _LOCK = Lock()
+_WORKING_FOR: ContextVar[str] = ContextVar("working_for", default="")
 
 
 def library() -> Library:
@@ -59,8 +62,18 @@ def library() -> Library:
 
 
 def author() -> str:
-    """Who works here."""
-    return usual_author()
+    """Who works here: who has signed in, where one has to; for work, who began it."""
+    return _WORKING_FOR.get() or session.signed_in() or usual_author()
+
+
+@contextmanager
+def working_for(name: str) -> Iterator[None]:
+    """Keep what is made in this thread as somebody's, who may have gone meanwhile."""
+    token = _WORKING_FOR.set(name)
+    try:
+        yield
+    finally:
+        _WORKING_FOR.reset(token)
 
 
 def is_id(text: str) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import cast
+from urllib.parse import urlencode, urlsplit
 
 import streamlit as st
 from streamlit.delta_generator import DeltaGenerator
@@ -307,6 +308,18 @@ def begin_run(page: str) -> None:
             {} if went_back else {name: st.query_params.get_all(name) for name in st.query_params}
         )
         st.session_state["_link"], st.session_state["_unusable"] = said, []
+
+
+def page_title() -> str:
+    """Of the page that a visitor looks at; "" before there is one."""
+    return str(st.session_state.get("_page", ""))
+
+
+def page_address() -> str:
+    """Of the page that a visitor looks at, from where the dashboard begins; "" of the first one."""
+    page = urlsplit(st.context.url or "").path.rsplit("/", 1)[-1]
+    parameters = {name: st.query_params.get_all(name) for name in st.query_params}
+    return f"{page}?{urlencode(parameters, doseq=True)}" if page else ""
 
 
 def absurd_parameters() -> tuple[str, ...]:

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from sarl_core import Environment, InputError
-from sarl_core.agents.offers import Offers, read_offers
+from sarl_core.agents.offers import Offers
+from sarl_core.serving.settings import read_settings
 
 SETTINGS = """
 [[environments]]
@@ -42,8 +43,8 @@ def test_a_settings_file_says_what_is_offered_in_either_language(tmp_path: Path)
             }
         )
     )
-    offers = read_offers(first)
-    assert offers == read_offers(second) == Offers.from_text(offers.to_text())
+    offers = read_settings(first).offers
+    assert offers == read_settings(second).offers == Offers.from_text(offers.to_text())
     assert offers.environments[0] == Environment(
         "crane_task:Crane-v0",
         '{"load": 3.5, "wind": [1, 2]}',
@@ -76,4 +77,4 @@ def test_settings_that_say_something_else_are_refused(tmp_path: Path, text: str,
     path = tmp_path / "offers.toml"
     path.write_text(text)
     with pytest.raises(InputError, match=said):
-        read_offers(path)
+        read_settings(path)

@@ -25,6 +25,7 @@ from sarl_dashboard.components.column_form import ColumnForm
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Job, Place
+from sarl_dashboard.jobs.queue import memory_shortage
 from sarl_dashboard.state.data import set_upload, steps_of, uncombined_demonstrations
 from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
@@ -57,6 +58,8 @@ def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
     if not files:
         return
     try:
+        if shortage := memory_shortage():
+            raise InputError(f"{shortage}, so nothing is read now; try again in a few minutes")
         if sum(file.size for file in files) > _AT_ONCE:
             PLACE.begin(_job_of(_request()))
             return

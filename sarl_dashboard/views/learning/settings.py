@@ -12,6 +12,7 @@ from sarl_core.learning.arms import ARMS
 from sarl_core.learning.run import TRIAL_EPISODES
 from sarl_core.learning.study import LearningPlan
 from sarl_core.rollouts.choices import CHOICE_TEXTS, Choice
+from sarl_core.serving.limits import ServerLimits
 from sarl_core.shielding.projection import Projection
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import notes_notice, projection_choice, rule_set_choice
@@ -21,12 +22,13 @@ from sarl_dashboard.state.environments import environment_of
 from sarl_dashboard.state.rule_choice import rules_for
 from sarl_dashboard.text import refuse
 
-MOST_STEPS, MOST_SEEDS, MOST_EPISODES = 500_000, 5, 500
+MOST_EPISODES = 500
 NOBODY = "nobody"
 
 
 def settings() -> LearningOrder | None:
     """The widgets; None where what they say cannot be learned, which is then said."""
+    limits = ServerLimits.of_process()
     with st.container(border=True):
         with st.grid(3, min_column_width=150, gap="small"):
             rules = rule_set_choice(
@@ -35,26 +37,30 @@ def settings() -> LearningOrder | None:
             steps = st.number_input(
                 "Steps",
                 1_000,
-                MOST_STEPS,
-                20_000,
+                limits.learning_steps,
+                min(20_000, limits.learning_steps),
                 1_000,
                 key="learn_steps",
                 bind="query-params",
                 persist_state="session",
                 help=with_words(
                     "Of each learner. Lunar Lander needs 100,000 and more to show what a way to "
-                    "learn is worth, Cart Pole 30,000."
+                    "learn is worth, Cart Pole 30,000. This server takes up to "
+                    f"{limits.learning_steps:,}."
                 ),
             )
             seeds = st.number_input(
                 "Learners of each kind",
                 1,
-                MOST_SEEDS,
+                limits.learning_seeds,
                 1,
                 key="learn_seeds",
                 bind="query-params",
                 persist_state="session",
-                help=with_words("One may have been lucky; three say more."),
+                help=with_words(
+                    "One may have been lucky; three say more. This server takes up to "
+                    f"{limits.learning_seeds}."
+                ),
             )
         names = st.pills(
             "Ways to learn",
