@@ -14,7 +14,10 @@ from streamlit.logger import update_formatter
 VARIABLE = "SARL_LOG"
 """The environment variable that asks for it, by the value "json"."""
 
-_USUAL = frozenset(vars(logging.makeLogRecord({}))) | {"line", "message", "asctime", "taskName"}
+_USUAL = frozenset(vars(logging.makeLogRecord({}))) | {
+    *("line", "message", "asctime", "taskName"),
+    "color_message",  # the same once more, for a terminal
+}
 _PLAIN = (str, int, float, bool, type(None))
 
 

@@ -1,4 +1,4 @@
-"""Learning in a browser: live curves, stopping, and nothing left behind when the visitor goes."""
+"""Learning in a browser: live curves, stopping, and work that goes on when its page is closed."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def wait_until(wanted: int) -> None:
     raise AssertionError(at_work())
 
 
-def test_curves_grow_while_agents_learn_and_nothing_is_left_when_the_visitor_goes(
+def test_curves_grow_while_agents_learn_and_what_goes_on_stands_on_library(
     screen: Page,
 ) -> None:
     visit(screen, f"/learning?data=cartpole&learn_view=Your+own&learn_steps={STEPS}", "Learning")
@@ -59,8 +59,20 @@ def test_curves_grow_while_agents_learn_and_nothing_is_left_when_the_visitor_goe
     screen.get_by_role("button", name="Go on").click()
     wait_until(1)
     no_trace(screen)
-    screen.context.close()  # the visitor goes without a word
+    other = screen.context.new_page()
+    screen.close()  # without a word
+    visit(other, "/library", "Library")
+    work = other.get_by_test_id("stMain")
+    expect(work.get_by_text("No shield, learner 1:").first).to_be_visible()
+    assert len(at_work()) == 1
+    with other.context.expect_page() as opened:
+        work.get_by_role("link", name="Open", exact=True).first.click()
+    again = opened.value.get_by_test_id("stMain")
+    expect(again.get_by_role("button", name="Stop", exact=True)).to_be_visible(timeout=PATIENCE)
+    no_trace(opened.value)
+    work.get_by_role("button", name="Cancel", exact=True).first.click()
     wait_until(0)
+    no_trace(other)
 
 
 def test_the_shipped_study_is_shown(screen: Page) -> None:
