@@ -1,0 +1,44 @@
+"""What a server is made of says nothing that is not so."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+from sarl_core.serving.limits import ServerLimits
+from sarl_core.serving.settings import read_settings
+
+ROOT = Path(__file__).resolve().parents[2]
+DEPLOYMENT = ROOT / "deployment"
+
+
+def test_the_shipped_settings_are_the_usual_ones_and_those_of_the_guide(tmp_path: Path) -> None:
+    shipped = read_settings(DEPLOYMENT / "server.toml").limits
+    assert shipped == ServerLimits(memory_gib=6)
+    guide = (ROOT / "docs" / "guides" / "server.md").read_text(encoding="utf-8")
+    (tmp_path / "guide.toml").write_text(re.findall(r"```toml\n(.*?)```", guide, re.DOTALL)[0])
+    assert read_settings(tmp_path / "guide.toml").limits == shipped
+
+
+def test_the_proxy_takes_what_the_server_takes() -> None:
+    proxy = (DEPLOYMENT / "nginx.conf").read_text()
+    largest = int(re.findall(r"client_max_body_size (\d+)m", proxy)[0])
+    assert read_settings(DEPLOYMENT / "server.toml").limits.upload_mb < largest
+
+
+def test_the_container_is_built_from_what_there_is() -> None:
+    lines = (DEPLOYMENT / "Containerfile").read_text().splitlines()
+    copied = [line.split()[1:-1] for line in lines if re.match(r"COPY (?!--)", line)]
+    names = [name for sources in copied for name in sources]
+    assert len(names) > 8
+    assert [name for name in names if not (ROOT / name).exists()] == []
+    left_in = (DEPLOYMENT / "Containerfile.dockerignore").read_text()
+    assert [name for name in names if f"!{name}\n" not in left_in] == []
+
+
+def test_the_secrets_to_fill_in_are_all_that_signing_in_needs() -> None:
+    secrets = tomllib.loads((DEPLOYMENT / "secrets.example.toml").read_text())
+    assert set(secrets["auth"]) == {
+        *("redirect_uri", "cookie_secret", "client_id", "client_secret", "server_metadata_url"),
+    }
