@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 
 from starlette.requests import Request
@@ -13,6 +14,7 @@ from sarl_core import __version__
 from sarl_core.errors import SarlError
 from sarl_dashboard.session import memory_used
 
+_LOGGER = logging.getLogger(__name__)
 _STARTED = time.time()
 
 
@@ -22,13 +24,14 @@ def routes() -> list[Route]:
 
 
 def _health(_: Request) -> Response:
-    """200 where pages are served and what is made can be kept, else 503 and why."""
+    """200 where pages are served and what is made can be kept, else 503; the log says why."""
     from sarl_dashboard.state.library import library
 
     try:
         library().usage("")
     except SarlError as error:
-        return JSONResponse({"status": "no library", "reason": str(error)}, status_code=503)
+        _LOGGER.warning("%s", error)  # with addresses that are not for everybody
+        return JSONResponse({"status": "no library"}, status_code=503)
     return JSONResponse({"status": "ok", "version": __version__})
 
 
