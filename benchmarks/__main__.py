@@ -40,6 +40,8 @@ ROWS = {
     "recorder": "pages.recorder",
     "ablation": "rollouts.ablation",
     "import": "startup.imports",
+    "visitors": "visitors.sliders",
+    "uploads": "visitors.uploads",
     "cold-start": "browser.cold_start",
     "intervals": "evidence.intervals",
 }

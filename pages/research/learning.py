@@ -1,7 +1,7 @@
 """Learning: agents learn under the shield, and show what they are worth without it.
 
 The study that is shipped stands first. Studies of a visitor's own learn in a process beside the
-page, which goes on while other pages are looked at, and ends when the visitor has gone.
+page, which goes on while other pages are looked at, and when all of them are closed.
 """
 
 from __future__ import annotations

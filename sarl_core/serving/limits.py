@@ -26,7 +26,7 @@ class ServerLimits(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         learning_steps: Of each learner in a study.
         learning_seeds: Learners of each kind in a study.
         memory_gib: What the server and its processes may take, in GiB, for new work to begin and
-            for uploads to be read; None where nobody looks.
+            for demonstrations to be read; None where nobody looks.
     """
 
     upload_mb: Annotated[int, msgspec.Meta(ge=1, le=100_000)] = 200
