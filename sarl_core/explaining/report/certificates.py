@@ -8,7 +8,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from sarl_core.errors import InputError
-from sarl_core.explaining.words.certificate import LIMITS, certificate_facts
+from sarl_core.explaining.words.certificate import (
+    LIMITS,
+    certificate_facts,
+    subject_text,
+    verdict_text,
+)
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.studies.certificate import Certificate
 from sarl_core.studies.certificate_files import certificate_from
@@ -20,10 +25,12 @@ class CertificatesPart:
 
     Attributes:
         tables: Of each certificate names and values, the verdict first.
+        verdicts: What each has shown of whom, in sentences.
         limits: What none of them says.
     """
 
     tables: tuple[tuple[tuple[str, str], ...], ...]
+    verdicts: tuple[str, ...]
     limits: str = LIMITS
 
 
@@ -55,7 +62,10 @@ def certificates_part(
         carried.append(certificate_from((card or {}).get("certificate"), name="the card"))
     known = [one for one in carried if one.subject.rules_digest == digest]
     every = dict.fromkeys((*given, *known))
-    return CertificatesPart(tuple(_table(one) for one in every))
+    return CertificatesPart(
+        tuple(_table(one) for one in every),
+        tuple(f"{verdict_text(one)} Tested was {subject_text(one.subject)}." for one in every),
+    )
 
 
 def _table(certificate: Certificate) -> tuple[tuple[str, str], ...]:

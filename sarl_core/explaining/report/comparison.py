@@ -71,6 +71,7 @@ class Result:
             interval; None where both were not run.
         effect: What that and the failures mean: helps, harms, or no difference seen; "" where
             unknown.
+        agent: Who acted; "" where unknown.
     """
 
     name: str
@@ -94,6 +95,7 @@ class Result:
     freedom: float | None = None
     gained: MeanInterval | None = None
     effect: str = ""
+    agent: str = ""
 
 
 @dataclass(frozen=True)
@@ -214,7 +216,7 @@ def compared(results: Sequence[Result]) -> Compared | None:
     """
     if not results:
         return None
-    scale = SvgScale.over([one.low for one in results] + [one.high for one in results], margin=0.04)
+    scale = typical_scale(results)
     more = [_more(one) for one in results]
     known = [
         place
@@ -246,6 +248,24 @@ def compared(results: Sequence[Result]) -> Compared | None:
         ),
         ends=(number_text(scale.low), number_text(scale.high)),
     )
+
+
+def typical_scale(results: Sequence[Result]) -> SvgScale:
+    """Where typical returns and their intervals are drawn.
+
+    Args:
+        results: At least one.
+
+    Returns:
+        The scale that shows all of them.
+    """
+    ends = [end for one in results for end in (one.low, one.high)]
+    return SvgScale.over(ends, margin=0.04)
+
+
+def is_known(one: Result) -> bool:
+    """Whether it is known which episodes failed, and some ran to their end."""
+    return one.crashes is not None and one.undecided < one.episodes
 
 
 # --- reading -----------------------------------------------------------------------------------
@@ -327,6 +347,7 @@ class _ResultRow(Struct):
     difference_low: Number | None = None
     difference_high: Number | None = None
     effect: Effect | None = None
+    agent: str | None = None
 
     def read(self) -> Result:
         if not self.iqm_low <= self.iqm <= self.iqm_high:
@@ -353,6 +374,7 @@ class _ResultRow(Struct):
             freedom=None if self.coverage is None else self.freedom,
             gained=_gain(self.return_difference, self.difference_low, self.difference_high),
             effect=self.effect or "",
+            agent=self.agent or "",
         )
 
 
@@ -378,7 +400,7 @@ def _crashes(one: Result) -> str:
     """The share of failures with its interval."""
     if one.crashes is None and cannot_fail(one.env_id):
         return _NONE
-    if one.crashes is None or one.undecided == one.episodes:
+    if one.crashes is None or not is_known(one):
         return _NOT_KNOWN
     share = at_least_text(one.crashes, one.undecided)
     if one.crash_ends is None:

@@ -21,10 +21,12 @@ from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, require
 from sarl_core.explaining.report.certificates import certificates_part
 from sarl_core.explaining.report.comparison import Result, compared
+from sarl_core.explaining.report.cover import PLAIN, Cover
 from sarl_core.explaining.report.demonstrations import demonstrations_part
 from sarl_core.explaining.report.gaps import gaps
 from sarl_core.explaining.report.provenance import commands_that_hold, facts, mined_again
 from sarl_core.explaining.report.rules import in_order, rules_part
+from sarl_core.explaining.report.summary import summary_part
 from sarl_core.explaining.report.tally import Tally, report_rules, same_environment, tally
 from sarl_core.explaining.report.thresholds import thresholds_part
 from sarl_core.explaining.templates import render
@@ -73,6 +75,7 @@ class Wishes:
     rules_name: str = ""
     demonstrations_name: str = ""
     sign_off: SignOff | None = None
+    cover: Cover = PLAIN
 
     def __post_init__(self) -> None:
         """Refuse what no report can hold.
@@ -141,6 +144,7 @@ def make_report(
     rules_name: str = "",
     demonstrations_name: str = "",
     sign_off: SignOff | None = None,
+    cover: Cover = PLAIN,
     card: Mapping[str, Any] | None = None,
     comparison: Sequence[Result] = (),
     certificates: Sequence[Certificate] = (),
@@ -164,6 +168,7 @@ def make_report(
         rules_name: Of the rule file, "" where there is none.
         demonstrations_name: Of their file, likewise.
         sign_off: Who approved these very rules; None to say nothing of it.
+        cover: What a person puts on the first page: title, author, date, notes, who signs, a logo.
         card: Of the rule file, as `read_card` gives it.
         comparison: Results to show.
         certificates: Of these very rules.
@@ -182,6 +187,7 @@ def make_report(
     call = "call make_report(rules, demonstrations)"
     require(rule_set, RuleSet, "what a report is about must be a RuleSet", call)
     require_demands(rule_set, "the report")
+    require(cover, Cover, "the cover of a report must be a Cover", "make one: Cover(title=...)")
     must = "what a report shows the rules on must be Demonstrations"
     require(demonstrations, Demonstrations, must, call)
     wishes = Wishes(
@@ -196,6 +202,7 @@ def make_report(
         rules_name=rules_name,
         demonstrations_name=demonstrations_name,
         sign_off=sign_off,
+        cover=cover,
     )
     as_given = rule_set
     demonstrations = recoded(demonstrations, rule_set.source.features, called="the demonstrations")
@@ -213,18 +220,32 @@ def make_report(
     order = in_order(rule_set, wishes.in_full)
     examples, without = _examples(rule_set, demonstrations, order[0], wishes, progress)
     about = demonstrations.env_id or rule_set.source.env_id
+    uncovered = gaps(rule_set, demonstrations, counts, examples)
+    elsewhere = _elsewhere(as_given, demonstrations, trees)
+    plain_title = f"Rules for {task_name(about)}" if about else "Rules from demonstrations"
     html = render(
         "documents/report",
-        title=f"Rules for {task_name(about)}" if about else "Rules from demonstrations",
+        title=wishes.cover.title or plain_title,
+        cover=wishes.cover,
+        summary=summary_part(
+            rule_set,
+            demonstrations,
+            counts,
+            results=comparison,
+            certified=certified,
+            gaps=uncovered,
+            elsewhere=elsewhere,
+            sign_off=wishes.sign_off,
+        ),
         key_numbers=_key_numbers(rule_set, counts),
         sign_off=sign_off_text(wishes.sign_off),
-        elsewhere=_elsewhere(as_given, demonstrations, trees),
+        elsewhere=elsewhere,
         demonstrations=demonstrations_part(rule_set, demonstrations, counts),
         thresholds=thresholds_part(rule_set, counts, trees, card),
         rules=rules_part(rule_set, demonstrations, counts, order, examples),
         pictures=_about_pictures(examples, without, wishes, demonstrations),
         frame_size=examples.size if examples is not None else (0, 0),
-        gaps=gaps(rule_set, demonstrations, counts, examples),
+        gaps=uncovered,
         compared=compared(comparison),
         certified=certified,
         again=facts(

@@ -212,7 +212,7 @@ def _cut(rule_set: RuleSet) -> tuple[str, ...]:
     limits, steps = rule_set.thresholds, rule_set.source.steps
     least = math.ceil(limits.support * steps - 1e-9)
     sentences = [
-        "Rules come from a decision tree: questions about the state, asked one after the other. "
+        "Rules come from a decision tree: conditions on the state, tried one after the other. "
         "Each way through the tree ends at the first point that is good enough to be a rule.",
         f"A rule was kept if it applies to at least {share_text(limits.support)} of the "
         f"demonstrated states ({counted(max(least, 1), 'state')} of {steps:,}; this share is its "
@@ -226,7 +226,7 @@ def _cut(rule_set: RuleSet) -> tuple[str, ...]:
             "(its lift)."
         )
     if limits.max_depth is not None:
-        sentences.append(f"No rule may ask more than {counted(limits.max_depth, 'question')}.")
+        sentences.append(f"No rule may have more than {counted(limits.max_depth, 'condition')}.")
     named = [name for name, pair in NAMED_SETTINGS.items() if pair == limits]
     sentences.append(
         f"This is the setting “{named[0]}” of the paper behind the method."
@@ -321,7 +321,7 @@ def _built(rule_set: RuleSet, card: _RuleSetCard) -> tuple[str, ...]:
     if rule_set.cut != "leaves":
         return _cut(rule_set)
     sentences = [
-        "These rules were not cut out by thresholds. A tree of a few questions was built so that "
+        "These rules were not cut out by thresholds. A tree of a few conditions was built so that "
         "in every state exactly one rule for each action applies: few rules that do as much as "
         "possible. So these rules leave an agent nothing to choose from: they are a policy that "
         "replaces it, and no longer a shield that corrects it here and there.",

@@ -1,0 +1,127 @@
+"""The first page of a report, and what a person puts on it."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from sarl_core import Demonstrations, InputError, load_demonstrations, mine_rules
+from sarl_core.explaining.report.comparison import read_results
+from sarl_core.explaining.report.cover import Cover, logo_of, read_logo
+from sarl_core.explaining.report.report import Report, make_report
+from sarl_core.explaining.report.summary import pairs_of
+
+ROOT = Path(__file__).parents[2]
+CSV = ROOT / "docs" / "reports" / "cartpole.csv"
+HOSTILE = "<script>alert(1)</script>{{ 7*7 }}"
+
+
+@pytest.fixture(scope="module")
+def cart() -> Demonstrations:
+    return load_demonstrations(ROOT / "data" / "demonstrations" / "cartpole.parquet")
+
+
+def reported(cart: Demonstrations, **wishes: object) -> Report:
+    return make_report(mine_rules(cart, supp_min=0.005, conf_min=0.95), cart, frames=0, **wishes)
+
+
+def first_page(report: Report) -> str:
+    return report.html.split("<header")[1].split("</header>")[0]
+
+
+def picture(form: str) -> bytes:
+    file = io.BytesIO()
+    Image.new("RGB", (900, 300), "#336699").save(file, format=form)
+    return file.getvalue()
+
+
+def test_the_first_page_says_what_the_rules_do_to_whom(cart: Demonstrations) -> None:
+    results = read_results(CSV)
+    page = first_page(reported(cart, comparison=results))
+    for pair in pairs_of(results):
+        assert pair.alone is not None
+        assert pair.alone.agent == pair.shielded.agent
+        assert f"With the rules (“{pair.shielded.name}”) the mean return of the" in page
+    assert "95 % intervals" in page
+    assert page.count("<svg") == 2 * len(results)
+    assert "What to decide" in page
+
+
+def test_without_a_comparison_the_first_page_says_how_to_get_one(cart: Demonstrations) -> None:
+    page = first_page(reported(cart))
+    assert "Nothing was measured for this report" in page
+    assert "sarl evaluate --env CartPole-v1" in page
+    assert "--comparison" in page
+    assert "sarl audit" in first_page(reported(dataclasses.replace(cart, env_id="")))
+
+
+def test_only_what_is_of_one_agent_on_the_same_seeds_stands_side_by_side() -> None:
+    alone, shielded, *_ = read_results(CSV)
+    assert pairs_of([alone, shielded])[0].alone == alone
+    other = dataclasses.replace(alone, agent="somebody else")
+    later = dataclasses.replace(alone, seed=7)
+    for one in (other, later):
+        assert pairs_of([one, shielded])[0].alone is None
+    nameless = [dataclasses.replace(one, agent="") for one in (alone, shielded)]
+    assert pairs_of(nameless)[0].alone == nameless[0]
+    assert pairs_of([*nameless, dataclasses.replace(nameless[0], mean=0.0)])[0].alone is None
+
+
+def test_what_a_person_sets_stands_on_the_first_page_as_text(cart: Demonstrations) -> None:
+    cover = Cover(
+        title=f"Title {HOSTILE}",
+        author=f"Author {HOSTILE}",
+        date="28 November 2026",
+        notes=f"One.\nNote {HOSTILE}",
+        signers=(f"Signer {HOSTILE}",),
+        logo=logo_of(picture("JPEG"), "logo.jpg"),
+    )
+    page = first_page(reported(cart, cover=cover))
+    assert "<script" not in page
+    for word in ("Title", "Author", "Note", "Signer"):
+        assert f"{word} &lt;script&gt;alert(1)&lt;/script&gt;{{{{ 7*7 }}}}" in page
+    assert "28 November 2026" in page
+    assert 'src="data:image/png;base64,' in page
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"title": "x" * 10_000}, "the title of a report has 10,000 characters"),
+        ({"notes": "x" * 601}, "the notes of a report have"),
+        ({"signers": ("a",) * 5}, "5 people are to sign"),
+        ({"author": 3}, "must be text"),
+    ],
+)
+def test_what_does_not_fit_on_a_page_is_refused(settings: dict[str, object], sentence: str) -> None:
+    with pytest.raises(InputError, match=sentence):
+        Cover(**settings)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"",
+        b"<svg xmlns='http://www.w3.org/2000/svg'><script>alert(1)</script></svg>",
+        picture("GIF"),
+        picture("PNG")[:200],
+    ],
+    ids=["nothing", "script", "another format", "half"],
+)
+def test_a_logo_that_is_no_picture_is_refused(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "logo.png"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match="is no PNG or JPEG picture") as caught:
+        read_logo(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_logo_is_drawn_anew_and_small() -> None:
+    hidden = b"<script>alert(1)</script>"
+    logo = logo_of(picture("PNG") + hidden, "logo.png")
+    assert logo == logo_of(picture("PNG"), "logo.png")
+    assert logo.height <= 160
