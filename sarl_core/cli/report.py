@@ -47,7 +47,7 @@ def report(
             help="The demonstrations they are about, or a .mined file.",
         ),
     ],
-    out: Annotated[Path, out_option("The file to write.", metavar="FILE.html")],
+    out: Annotated[Path, out_option("The file to write: .html, or .pdf.", metavar="FILE")],
     comparison: Annotated[
         list[Path] | None,
         typer.Option(
@@ -65,6 +65,48 @@ def report(
             metavar="FILE",
             show_default=False,
             help="What `certify --out` wrote of these rules. May be given several times.",
+        ),
+    ] = None,
+    slides: Annotated[
+        Path | None,
+        typer.Option(
+            "--slides",
+            metavar="FILE.html",
+            show_default=False,
+            help="Write slides as well, one for each rule in full; arrow keys go on.",
+        ),
+    ] = None,
+    title: Annotated[
+        str, typer.Option("--title", metavar="TEXT", show_default="the task", help="Of the report.")
+    ] = "",
+    author: Annotated[
+        str, typer.Option("--author", metavar="TEXT", show_default=False, help="Who wrote it.")
+    ] = "",
+    date: Annotated[
+        str,
+        typer.Option(
+            "--date", metavar="TEXT", show_default=False, help="As it is to stand on the report."
+        ),
+    ] = "",
+    logo: Annotated[
+        Path | None,
+        typer.Option(
+            "--logo", metavar="FILE", show_default=False, help="PNG or JPEG, at its head."
+        ),
+    ] = None,
+    notes: Annotated[
+        str,
+        typer.Option(
+            "--notes", metavar="TEXT", show_default=False, help="What you say, on its first page."
+        ),
+    ] = "",
+    signer: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--sign-off",
+            metavar="NAME",
+            show_default=False,
+            help="Who is to sign on its first page. May be given several times.",
         ),
     ] = None,
     in_full: Annotated[
@@ -107,16 +149,19 @@ def report(
     missing: MissingName = "refuse",
     as_json: Json = False,
 ) -> None:
-    """Write a report of rules: one HTML file for people who know only the task.
+    """Write a report of rules: one file for people who know only the task.
 
     Example: `python -m sarl_core report data/rules/lunar_lander_compact.json --demonstrations
     data/demonstrations/lunar_lander.parquet --out report.html`
     """
-    terminal.check_output(out, (".html",))
+    terminal.check_output(out, (".html", ".pdf"))
+    if slides is not None:
+        terminal.check_output(slides, (".html",), option="--slides")
     with terminal.working("Making the report") as advance:
         from sarl_core.demonstrations.formats.mapping.roles import as_options
         from sarl_core.demonstrations.recoding import recoded
         from sarl_core.explaining.report.comparison import read_results
+        from sarl_core.explaining.report.cover import Cover, read_logo
         from sarl_core.explaining.report.provenance import command_line, mining_command
         from sarl_core.explaining.report.report import make_report
         from sarl_core.explaining.report.thresholds import read_card
@@ -124,6 +169,14 @@ def report(
         from sarl_core.mining.rule_set import RuleSet
         from sarl_core.studies.certificate_files import load_certificate
 
+        cover = Cover(
+            title=title,
+            author=author,
+            date=date,
+            notes=notes,
+            signers=tuple(signer or ()),
+            logo=None if logo is None else read_logo(logo),
+        )
         rule_set = RuleSet.load(rules)
         trees = None
         if is_mined_file(demonstrations):
@@ -150,6 +203,13 @@ def report(
             "--missing": None if missing == "refuse" else missing,
             "--comparison": [called(path) for path in comparison or ()],
             "--certificate": [called(path) for path in certificate or ()],
+            "--title": title or None,
+            "--author": author or None,
+            "--date": date or None,
+            "--logo": logo,
+            "--notes": notes or None,
+            "--sign-off": list(signer or ()),
+            "--slides": slides,
             "--in-full": None if in_full == _IN_FULL else in_full,
             "--frames": None if frames == _FRAMES else frames,
             **({} if env is None else env.options),
@@ -187,6 +247,7 @@ def report(
             rules_name=called(rules, short=True),
             demonstrations_name=called(demonstrations, short=True),
             sign_off=sign_off,
+            cover=cover,
             card=card,
             comparison=results,
             certificates=certificates,
@@ -194,11 +255,14 @@ def report(
             progress=advance,
         )
         document.save(out)
-    size = len(document.html.encode())
+        if slides is not None:
+            document.save_slides(slides)
+    size = out.stat().st_size
     if as_json:
         terminal.print_json(
             {
                 "out": str(out),
+                "slides": None if slides is None else str(slides),
                 "rules": document.rules,
                 "in_full": document.in_full,
                 "pictures": document.pictures,
@@ -209,10 +273,14 @@ def report(
             }
         )
         return
+    from sarl_core.mining.language import counted
+
     lines = [
         f"Wrote {out}: {document.rules:,} rules, {document.in_full:,} of them in full, "
         f"{document.pictures:,} pictures, {size / 1e6:.1f} MB."
     ]
+    if slides is not None:
+        lines.append(f"Wrote {slides}: {counted(document.in_full + 2, 'slide')}.")
     if document.without:
         lines.append(f"There are no pictures: {document.without}.")
     from sarl_core.cli.answers.summaries import print_notes

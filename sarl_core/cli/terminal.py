@@ -211,18 +211,19 @@ def print_notes(notes: Iterable[str]) -> None:
         print(f"note: {' '.join(said(note).split())}", file=sys.stderr)  # noqa: T201
 
 
-def check_output(path: Path, suffixes: Sequence[str]) -> None:
+def check_output(path: Path, suffixes: Sequence[str], *, option: str = "--out") -> None:
     """Refuse a path that cannot be written, before any work is done for it.
 
     Args:
         path: The file that is to appear.
         suffixes: What it may end in, as ".json".
+        option: That gave it.
 
     Raises:
         InputError: If it ends in something else, its folder does not exist, or it is a folder.
     """
     if path.suffix.lower() not in suffixes:
-        raise InputError(f"--out {path} must end in {' or '.join(suffixes)}; give such a name")
+        raise InputError(f"{option} {path} must end in {' or '.join(suffixes)}; give such a name")
     if not path.parent.is_dir():
         raise InputError(f"the folder {path.parent} does not exist; make it or choose another")
     if path.is_dir():

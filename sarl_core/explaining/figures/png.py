@@ -22,6 +22,7 @@ Draw = Callable[["go.Figure"], bytes]
 
 _SCALE = 2  # pixels for one, so that text is sharp
 _COLOURS = 256
+_WHAT = "the picture could not be drawn"
 _BROWSER = "BROWSER_PATH"  # environment variable that Kaleido goes by
 
 
@@ -70,7 +71,7 @@ class _Session:
             return self.runner.run(self._drawn(figure))
         except Exception:
             self._end()
-            raise _cannot_draw(first, "leave the pictures out") from first
+            raise without_browser(first, _WHAT, "leave the pictures out") from first
 
     async def _drawn(self, figure: go.Figure) -> bytes:
         import kaleido
@@ -113,7 +114,7 @@ def figure_to_png(figure: go.Figure) -> bytes:
     try:
         picture: bytes = figure.to_image(format="png", scale=_SCALE)
     except Exception as error:  # whatever Kaleido or the browser has to complain about
-        raise _cannot_draw(error, "write .html") from error
+        raise without_browser(error, _WHAT, "write .html") from error
     return picture
 
 
@@ -149,19 +150,19 @@ def _silence_browser() -> None:
     logging.getLogger("choreographer").setLevel(logging.CRITICAL + 1)
 
 
-def _cannot_draw(error: Exception, advice: str) -> WorkError:
-    """What to tell who has no browser to draw pictures with, or none that works.
+def without_browser(error: Exception, what: str, advice: str) -> WorkError:
+    """What to tell who has no browser to draw with, or none that works.
 
     Args:
         error: Of Kaleido or the browser.
+        what: What could not be done, as "the picture could not be drawn".
         advice: What else to do, after "or".
 
     Returns:
         The error to raise.
     """
     return WorkError(
-        "the picture could not be drawn, which takes an installed Chromium or Chrome: "
-        f"{_lacking(error)}, or {advice}"
+        f"{what}, which takes an installed Chromium or Chrome: {_lacking(error)}, or {advice}"
     )
 
 

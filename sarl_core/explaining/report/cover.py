@@ -72,7 +72,7 @@ class Cover:
                 raise InputError(
                     f"{name} of a report {'have' if name.endswith('notes') else 'has'} "
                     f"{len(text):,} characters; give at most {most}, so that the first page holds "
-                    "them"
+                    "it"
                 )
         if len(self.signers) > MOST_SIGNERS:
             raise InputError(

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from numbers import Integral
 from pathlib import Path
 from typing import Any
@@ -24,8 +25,10 @@ from sarl_core.explaining.report.comparison import Result, compared
 from sarl_core.explaining.report.cover import PLAIN, Cover
 from sarl_core.explaining.report.demonstrations import demonstrations_part
 from sarl_core.explaining.report.gaps import gaps
+from sarl_core.explaining.report.pdf import document_to_pdf
 from sarl_core.explaining.report.provenance import commands_that_hold, facts, mined_again
 from sarl_core.explaining.report.rules import in_order, rules_part
+from sarl_core.explaining.report.slides import slides_document
 from sarl_core.explaining.report.summary import summary_part
 from sarl_core.explaining.report.tally import Tally, report_rules, same_environment, tally
 from sarl_core.explaining.report.thresholds import thresholds_part
@@ -106,6 +109,7 @@ class Report:
         pictures: Number of example frames.
         without: Why there are none; "" where there are some, or none were wished for.
         notes: How demonstrations, rules and environment were read and matched, as clauses.
+        parts: What its template was filled with, by name.
     """
 
     html: str
@@ -114,9 +118,37 @@ class Report:
     pictures: int
     without: str
     notes: tuple[str, ...] = ()
+    parts: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def slides(self) -> str:
+        """The rules in full as slides, one each: an HTML document that arrow keys go through."""
+        return slides_document(self.parts)
+
+    @property
+    def pdf(self) -> bytes:
+        """The report on paper; a WorkError where no Chromium or Chrome is there to print it."""
+        return document_to_pdf(self.html)
 
     def save(self, path: str | Path) -> None:
         """Write the file; it appears whole or not at all.
+
+        Args:
+            path: An `.html` or a `.pdf` file.
+
+        Raises:
+            InputError: If it has another ending, or the folder does not exist.
+            WorkError: If it cannot be written to, or there is no browser to print a PDF.
+        """
+        if Path(as_path(path)).suffix.lower() == ".pdf":
+            with whole_file(as_path(path)) as unfinished:
+                unfinished.write_bytes(self.pdf)
+            return
+        with whole_file(as_path(path, ending=".html")) as unfinished:
+            unfinished.write_text(self.html, encoding="utf-8", newline="\n")
+
+    def save_slides(self, path: str | Path) -> None:
+        """Write the slides; they appear whole or not at all.
 
         Args:
             path: An `.html` file.
@@ -126,7 +158,7 @@ class Report:
             WorkError: If it cannot be written to.
         """
         with whole_file(as_path(path, ending=".html")) as unfinished:
-            unfinished.write_text(self.html, encoding="utf-8", newline="\n")
+            unfinished.write_text(self.slides, encoding="utf-8", newline="\n")
 
 
 def make_report(
@@ -223,11 +255,10 @@ def make_report(
     uncovered = gaps(rule_set, demonstrations, counts, examples)
     elsewhere = _elsewhere(as_given, demonstrations, trees)
     plain_title = f"Rules for {task_name(about)}" if about else "Rules from demonstrations"
-    html = render(
-        "documents/report",
-        title=wishes.cover.title or plain_title,
-        cover=wishes.cover,
-        summary=summary_part(
+    parts: dict[str, Any] = {
+        "title": wishes.cover.title or plain_title,
+        "cover": wishes.cover,
+        "summary": summary_part(
             rule_set,
             demonstrations,
             counts,
@@ -237,18 +268,18 @@ def make_report(
             elsewhere=elsewhere,
             sign_off=wishes.sign_off,
         ),
-        key_numbers=_key_numbers(rule_set, counts),
-        sign_off=sign_off_text(wishes.sign_off),
-        elsewhere=elsewhere,
-        demonstrations=demonstrations_part(rule_set, demonstrations, counts),
-        thresholds=thresholds_part(rule_set, counts, trees, card),
-        rules=rules_part(rule_set, demonstrations, counts, order, examples),
-        pictures=_about_pictures(examples, without, wishes, demonstrations),
-        frame_size=examples.size if examples is not None else (0, 0),
-        gaps=uncovered,
-        compared=compared(comparison),
-        certified=certified,
-        again=facts(
+        "key_numbers": _key_numbers(rule_set, counts),
+        "sign_off": sign_off_text(wishes.sign_off),
+        "elsewhere": elsewhere,
+        "demonstrations": demonstrations_part(rule_set, demonstrations, counts),
+        "thresholds": thresholds_part(rule_set, counts, trees, card),
+        "rules": rules_part(rule_set, demonstrations, counts, order, examples),
+        "pictures": _about_pictures(examples, without, wishes, demonstrations),
+        "frame_size": examples.size if examples is not None else (0, 0),
+        "gaps": uncovered,
+        "compared": compared(comparison),
+        "certified": certified,
+        "again": facts(
             as_given,
             demonstrations,
             counts,
@@ -257,10 +288,10 @@ def make_report(
             seeds=(wishes.seed, wishes.seed + wishes.episodes - 1) if examples else None,
             notes=() if same_environment(rule_set, demonstrations) else notes,
         ),
-        commands=commands_that_hold(wishes.commands, as_given, trees),
-    )
+        "commands": commands_that_hold(wishes.commands, as_given, trees),
+    }
     return Report(
-        html=html,
+        html=render("documents/report", **parts),
         rules=len(rule_set),
         in_full=len(order[0]),
         pictures=sum(len(of_rule) for of_rule in examples.frames.values()) if examples else 0,
@@ -268,6 +299,7 @@ def make_report(
         notes=tuple(
             dict.fromkeys((*demonstrations.notes, *notes, *(examples.remarks if examples else ())))
         ),
+        parts=parts,
     )
 
 

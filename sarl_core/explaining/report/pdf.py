@@ -1,0 +1,55 @@
+"""An HTML document as a PDF, printed by the Chromium or Chrome of this machine."""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+from pathlib import Path
+
+from sarl_core.explaining.figures.png import without_browser
+
+_PATIENCE = 180  # seconds; of large reports with many pictures a slow machine needs some
+_WHAT = "the PDF could not be printed"
+_ADVICE = "write .html and print it from a browser"
+
+
+def document_to_pdf(html: str) -> bytes:
+    """Print a document that opens by itself.
+
+    Args:
+        html: The document, with its style for paper.
+
+    Returns:
+        A PDF file.
+
+    Raises:
+        WorkError: If there is no Chromium or Chrome to print it with.
+    """
+    try:
+        from choreographer.browsers.chromium import Chromium
+
+        browser = Chromium.find_browser(skip_local=False)
+        if browser is None:
+            raise FileNotFoundError
+        return _printed(browser, html)
+    except (ImportError, OSError, subprocess.SubprocessError) as error:
+        raise without_browser(error, _WHAT, _ADVICE) from error
+
+
+def _printed(browser: str, html: str) -> bytes:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+        page, printed = Path(folder, "report.html"), Path(folder, "report.pdf")
+        page.write_text(html, encoding="utf-8", newline="\n")
+        # Without its sandbox, as pictures are drawn: root has none. The page runs no script and
+        # fetches nothing.
+        arguments = (
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--no-pdf-header-footer",
+            f"--user-data-dir={folder}/profile",
+            f"--print-to-pdf={printed}",
+            page.as_uri(),
+        )
+        subprocess.run([browser, *arguments], check=True, capture_output=True, timeout=_PATIENCE)
+        return printed.read_bytes()
