@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.applications import labels_of
+from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet, obeying_labels
 from sarl_core.shielding.shield import Shield
 
@@ -48,6 +51,71 @@ def allowed_actions(shield: Shield, observations: ArrayLike, count: int) -> NDAr
     # Asked of the shield itself, so that the two never differ.
     decision = shield.decide_batch(np.tile(states, (count, 1)), proposed)
     return ~decision.intervened.reshape(count, len(states)).T
+
+
+@dataclass(frozen=True)
+class LabelsLeft:
+    """What never-rules take away in one state, of one action dimension with L labels.
+
+    Attributes:
+        forbidden: The labels that are replaced, ascending, and the index of the rule that forbids
+            each.
+        left: The others, at least one.
+    """
+
+    forbidden: tuple[tuple[int, int], ...]
+    left: tuple[int, ...]
+
+    @property
+    def freedom(self) -> float:
+        """What is left to choose from: log(labels left) / log(labels), 1 of a single label."""
+        labels = len(self.left) + len(self.forbidden)
+        return float(np.log(len(self.left)) / np.log(labels)) if labels > 1 else 1.0
+
+
+def labels_left(shield: Shield, state: NDArray[np.float32], dimension: int) -> LabelsLeft | None:
+    """What may be done in one state.
+
+    Args:
+        shield: Any.
+        state: Shape (d,).
+        dimension: Index of the action dimension.
+
+    Returns:
+        None where no never-rule applies there, or one that demands decides.
+
+    Raises:
+        InputError: As `Shield.decide`.
+    """
+    rule_set = shield.rule_set
+    (in_force,) = shield.rules_in_force(state[None])
+    rule = int(in_force[dimension])
+    if rule < 0 or not rule_set.rules[rule].forbids:
+        return None
+    # Every label is proposed: what is executed as it is, is left.
+    wanted = [_proposable(one) for one in rule_set.actions]
+    count = len(wanted[dimension])
+    proposed = np.array([[values[0] for values in wanted]] * count)
+    proposed[:, dimension] = wanted[dimension]
+    states = np.repeat(state[None], count, axis=0)
+    decided = shield.decide_batch(states, proposed if len(wanted) > 1 else proposed[:, 0])
+    executed = rule_set.actions[dimension].labels_of(
+        np.reshape(decided.executed, proposed.shape)[:, dimension]
+    )
+    changed = executed != np.arange(count)
+    return LabelsLeft(
+        tuple(
+            (int(label), int(decided.rules[label, dimension])) for label in np.flatnonzero(changed)
+        ),
+        tuple(np.flatnonzero(~changed).tolist()),
+    )
+
+
+def _proposable(dimension: LabelledDimension) -> Sequence[float]:
+    """An action of each label."""
+    if not dimension.is_interval:
+        return dimension.actions
+    return [(low + high) / 2 for low, high in pairwise(dimension.edges)]
 
 
 def leeway_of(rule_set: RuleSet, demonstrations: Demonstrations) -> Leeway:

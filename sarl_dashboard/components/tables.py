@@ -12,7 +12,7 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.tables.evidence import held_out_columns
 from sarl_core.explaining.tables.rules import rule_columns
 from sarl_core.explaining.words.evidence import VERDICT_COLOURS, VERDICTS
-from sarl_core.mining.action_words import action_text
+from sarl_core.mining.action_words import action_text, says_text
 from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
@@ -25,13 +25,21 @@ _PHRASE = 260  # pixels: what a combination is called, on one line or two
 _NAME = 62  # pixels: four digits
 
 
-def action_column(actions: Sequence[LabelledDimension], meaning: str) -> tuple[Any, int]:
-    """The column of what rules say, each action in its colour, and how many pixels wide it is."""
+def action_column(
+    actions: Sequence[LabelledDimension], meaning: str, forbidding: Sequence[Rule] = ()
+) -> tuple[Any, int]:
+    """The column of what rules say, each action in its colour, and how many pixels wide it is.
+
+    Args:
+        actions: Action dimensions and their labels.
+        meaning: Help.
+        forbidding: Never-rules among the rules, each in the colour of what it forbids.
+    """
     colours = {
         action_text(label, dimension): label_colour(label)
         for dimension in actions
         for label in range(dimension.n_labels)
-    }
+    } | {says_text(rule, actions[rule.dimension]): label_colour(rule.label) for rule in forbidding}
     # About seven pixels a letter; what a long action takes, the conditions give.
     width = min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250)
     column = st.column_config.MultiselectColumn(
@@ -47,7 +55,9 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
     and the beginning of the conditions are seen.
     """
     column = st.column_config
-    action, action_width = action_column(rule_set.actions, "What the expert does there")
+    forbidding = [rule for rule in rule_set.rules if rule.forbids]
+    does = "What the expert does there" + ", or at most rarely" * bool(forbidding)
+    action, action_width = action_column(rule_set.actions, does, forbidding)
     return {
         "Rule": column.TextColumn(
             width=_NAME, help="Its name: rules are numbered by their place in the set"

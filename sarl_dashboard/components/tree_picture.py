@@ -28,7 +28,8 @@ class PathInTree:
 
     Attributes:
         tree: One action dimension's.
-        cut_at: Thresholds at which it is cut; None where every leaf is a rule.
+        cut_at: Thresholds at which it is cut; None where every leaf is a rule. Where some rules
+            forbid, no node is marked as one.
         node: At the end of the path.
         note: Said below.
     """
@@ -95,6 +96,8 @@ def _cut(tree: PolicyTree, thresholds: Thresholds | None) -> NDArray[np.int64]:
     """The nodes that are rules."""
     if thresholds is None:
         return np.flatnonzero(tree.feature == LEAF)
+    if thresholds.never is not None:  # what forbids one action lies above what forbids another
+        return np.array([], dtype=np.int64)
     return cut_nodes(
         tree,
         supp_min=thresholds.support,

@@ -133,6 +133,11 @@ class ReplayPair:
         return lru_cache(MOST_PICTURES)(self.film.png)
 
     @cached_property
+    def shield(self) -> Shield | None:
+        """Of the rules in force; None without rules."""
+        return self.order.shield
+
+    @cached_property
     def finder(self) -> PathFinder | None:
         """Follows a state through the rules; None without rules."""
         return None if self.rule_set is None else PathFinder(self.rule_set)

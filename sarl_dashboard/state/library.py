@@ -34,7 +34,7 @@ from sarl_core.library.results import add_result
 from sarl_core.limits import limited_bytes
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.editing.edits import Edit
-from sarl_core.mining.rule_set import RuleSet, require_demands, rules_digest
+from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.rollouts.episode_files import episodes_from_json, episodes_to_json
 from sarl_core.rollouts.episodes import Episodes
 from sarl_dashboard import session
@@ -150,9 +150,7 @@ def stored_rules(item: Item) -> RuleSet:
 @cached(show_spinner="Reading the rules …")
 def _read_rules(identifier: str, digest: str) -> RuleSet:
     opened = library()
-    rule_set = rules_of(opened, opened.item(identifier))
-    require_demands(rule_set, "the dashboard")
-    return rule_set
+    return rules_of(opened, opened.item(identifier))
 
 
 def stored_edits(item: Item, rule_set: RuleSet) -> tuple[Edit, ...]:

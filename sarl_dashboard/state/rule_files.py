@@ -11,7 +11,7 @@ from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.rule_order import fitting
 from sarl_core.mining.rule_order import rules_for as rules_of
-from sarl_core.mining.rule_set import RuleSet, require_demands, rules_from_json
+from sarl_core.mining.rule_set import RuleSet, rules_from_json
 from sarl_core.mining.rules import FILTERED, UNFILTERED
 from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached
@@ -45,9 +45,7 @@ def rules_in_file(content: bytes, name: str) -> RuleSet:
     Raises:
         InputError: If it is no rule file.
     """
-    rule_set = rules_from_json(content, name=name)
-    require_demands(rule_set, "the dashboard")
-    return rule_set
+    return rules_from_json(content, name=name)
 
 
 @cached()

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from sarl_core import Demonstrations, RuleSet, Shield, grow_policy_trees, mine_rules
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.never.never_rules import mine_never_rules, with_never_rules
-from sarl_core.shielding.leeway import allowed_actions, leeway_of
+from sarl_core.shielding.leeway import allowed_actions, labels_left, leeway_of
 from tests.mining.strategies import labelled_states
 
 
@@ -217,3 +217,26 @@ def test_of_several_continuous_actions_only_what_is_forbidden_is_moved():
         assert tuple(np.flatnonzero(decision.executed != proposed)) == changed
         together = shield.decide_batch(state[None], proposed[None])
         assert together.executed[0].tolist() == decision.executed.tolist()
+
+
+@settings(max_examples=30, deadline=None)
+@given(data=labelled_states(), abstain=st.booleans())
+def test_what_is_left_in_a_state_is_what_a_shield_lets_pass(data, abstain: bool) -> None:
+    rules = with_boxes(mine_never_rules(data, epsilon=0.6), data)
+    shield = Shield(rules, outside="abstain" if abstain else "act")
+    states = np.concatenate([data.observations[:5], data.observations[:5] + 3])
+    for state in states:
+        left = labels_left(shield, state, 0)
+        (in_force,) = shield.rules_in_force(state[None])
+        assert (left is None) == (in_force[0] < 0)
+        if left is None:
+            continue
+        count = rules.actions[0].n_labels
+        actions = [rules.actions[0].actions[label] for label in range(count)]
+        passed = [
+            label for label in range(count) if not shield.decide(state, actions[label]).intervened
+        ]
+        assert left.left == tuple(passed)
+        assert all(label in rules[rule].forbids for label, rule in left.forbidden)
+        (freedom,) = shield.freedom(state[None], in_force[None])
+        assert left.freedom == pytest.approx(freedom)

@@ -16,7 +16,7 @@ from markupsafe import Markup
 from sarl_core.demonstrations.dataset import Demonstrations, Feature
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.templates import render, style_sheet
-from sarl_core.mining.action_words import action_text, label_text
+from sarl_core.mining.action_words import says_label, says_text
 from sarl_core.mining.language import (
     counted,
     least_bounds,
@@ -138,7 +138,7 @@ def rule_matrix(rule_set: RuleSet, demonstrations: Demonstrations | None = None)
         demonstrations = None
     placed = [rule for rule in rule_set.rules if rule.placed]
     others = [rule for rule in rule_set.rules if not rule.placed]
-    others.sort(key=lambda rule: (rule.dimension, rule.action, -rule.samples))
+    others.sort(key=lambda rule: (rule.dimension, rule.label, rule.kind, -rule.samples))
     return RuleMatrix(
         rule_set,
         tuple(
@@ -189,11 +189,10 @@ def matrix_document(matrix: RuleMatrix) -> Markup:
 
 def _key(rules: Sequence[Rule], rule_set: RuleSet) -> list[tuple[str, str]]:
     """What the colours and marks of some rows mean; a mark has no colour."""
-    actions = {(rule.dimension, rule.action) for rule in rule_set.rules}
-    entries = [
-        (_action(label, rule_set, dimension), label_colour(label))
-        for dimension, label in sorted(actions)
-    ]
+    actions = {
+        (rule.dimension, rule.label, rule.kind, _action(rule, rule_set)) for rule in rule_set.rules
+    }
+    entries = [(text, label_colour(label)) for _, label, _, text in sorted(actions)]
     if any(rule.placed for rule in rules):
         entries.append((PLACED_LEGEND, ""))
     if not all(rule.enabled for rule in rules):
@@ -201,11 +200,10 @@ def _key(rules: Sequence[Rule], rule_set: RuleSet) -> list[tuple[str, str]]:
     return entries
 
 
-def _action(label: int, rule_set: RuleSet, dimension: int) -> str:
-    action = rule_set.actions[dimension]
+def _action(rule: Rule, rule_set: RuleSet) -> str:
+    action = rule_set.actions[rule.dimension]
     several = len(rule_set.actions) > 1 and not action.is_interval
-    text = action_text(label, action)
-    return f"{action.name}: {label_text(label, action)}" if several else text
+    return f"{action.name}: {says_label(rule, action)}" if several else says_text(rule, action)
 
 
 class _MatrixRow(NamedTuple):
@@ -227,7 +225,7 @@ def _row(matrix: RuleMatrix, rule: Rule) -> _MatrixRow:
         if bar := bars.get(column.feature):
             width = bar.right - bar.left
             cells[place] = bar.text, f"left:{bar.left:.1f}%;width:{width:.1f}%;background:{colour}"
-    action = _action(rule.action, matrix.rule_set, rule.dimension)
+    action = _action(rule, matrix.rule_set)
     name = matrix.rule_set.name_of(rule)
     if rule.placed:
         action = f"{PLACED_MARK}{action}"

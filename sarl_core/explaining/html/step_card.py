@@ -56,12 +56,14 @@ def state_table(state: Sequence[tuple[str, str, str]]) -> Markup:
     return table_html(_STATE, rows, "The state")
 
 
-def step_card(view: StepView, *, shielded: bool) -> Markup:
+def step_card(view: StepView, *, shielded: bool, left: Sequence[str] = ()) -> Markup:
     """What the agent wanted, what was done and why, and the state in which it was done.
 
     Args:
         view: The step.
         shielded: Whether there was a shield.
+        left: Of each action dimension what never-rules forbid there and leave, as a sentence, ""
+            where they say nothing; () without such rules.
 
     Returns:
         HTML.
@@ -70,6 +72,7 @@ def step_card(view: StepView, *, shielded: bool) -> Markup:
         "states/step_card",
         view=view,
         shielded=shielded,
+        left=left,
         margin=margin_text(view.margin),
         state=state_table(view.state),
         label_colour=label_colour,

@@ -69,6 +69,8 @@ def decision_html(
     state: NDArray[np.float32],
     rule_set: RuleSet,
     outside: Outside,
+    *,
+    left: str = "",
 ) -> Markup:
     """What is executed, and the rule behind it.
 
@@ -78,6 +80,7 @@ def decision_html(
         state: Shape (d,).
         rule_set: The shield's.
         outside: What the shield does outside the data of a rule.
+        left: What never-rules forbid there and leave, as a sentence.
 
     Returns:
         HTML: how the rules met the agent's action, the action executed, the rule
@@ -125,6 +128,7 @@ def decision_html(
         outcome=outcome,
         rule=rule_set.name_of(rule),
         sentence=sentence(rule, rule_set, state=values),
+        left=left,
         conditions=table_html(_CONDITIONS, rows, caption) if rows else "",
         outside=f"{'; '.join(beyond[:_MOST_OUTSIDE])}{more}",
         note="The state lies inside this rule's data: every feature is between the least and the "

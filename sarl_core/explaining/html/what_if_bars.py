@@ -113,9 +113,15 @@ def _looks(line: FeatureLine, stretch: int, dimension: int, rule_set: RuleSet) -
     """The label of what is executed in a stretch, and whether a rule decides it."""
     executed = line.decisions.executed[stretch : stretch + 1, dimension]
     label = int(rule_set.actions[dimension].labels_of(executed)[0])
-    rule = int(line.decisions.rules[stretch, dimension])
+    number = int(line.decisions.rules[stretch, dimension])
+    if number < 0:
+        return label, False
+    rule = rule_set.rules[number]
+    if rule.forbids:  # it decides where it takes something away
+        proposed = np.reshape(line.decisions.proposed, line.decisions.executed.shape)
+        return label, bool(executed[0] != proposed[stretch, dimension])
     # A rule that abstains is in force, and something else is executed.
-    return label, rule >= 0 and rule_set.rules[rule].action == label
+    return label, rule.action == label
 
 
 def _row_of_words(

@@ -212,7 +212,7 @@ def example_columns(
     )
     columns: dict[str, list[object]] = {
         "Expert did": list(did),
-        "As the rule says": (labels == rule.action).tolist(),
+        "As the rule says": rule.obeyed_by(labels).tolist(),
     }
     queried = [bounds.feature for bounds in rule.bounds]
     order = {feature: place for place, feature in reversed([*enumerate(queried)])}

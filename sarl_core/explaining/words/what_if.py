@@ -293,7 +293,8 @@ def node_in(tree: PolicyTree, rule: Rule, rule_set: RuleSet, *, leaves: bool) ->
         return None
     # A file may have renamed or rounded it: it is the node's if it asks what the way there asks.
     before, _, number = rule.id.rpartition(".")
-    if before != str(tree.index) or not (number.isascii() and number.isdigit()):
+    beginning = f"{tree.index}n{rule.label}" if rule.forbids else str(tree.index)
+    if before != beginning or not (number.isascii() and number.isdigit()):
         return None
     # Longer numbers are no node's, and Python refuses to read the longest.
     node = tree.place_of(node_of(rule)) if len(number) <= _LONGEST_NUMBER else None

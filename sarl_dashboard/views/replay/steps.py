@@ -21,9 +21,11 @@ from sarl_core.explaining.figures.replay import (
 from sarl_core.explaining.html.headings import aside
 from sarl_core.explaining.html.lit_path import lit_paths_html
 from sarl_core.explaining.html.step_card import picture, step_card
+from sarl_core.explaining.words.leeway import left_text
 from sarl_core.explaining.words.replay import StepView, step_texts, step_view
 from sarl_core.mining.language import counted, number_text
 from sarl_core.rollouts.episodes import Episodes
+from sarl_core.shielding.leeway import labels_left
 from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.flips import pace_of_played
 from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_room, show_legend
@@ -136,7 +138,7 @@ def at_step(played: Played, timeline: Timeline) -> None:
             ways = list(zip(names, tables, strict=True))
         st.html(picture(replay.png(current), f"The environment at step {current}", ways))
     with words:
-        st.html(step_card(view, shielded=shielded))
+        st.html(step_card(view, shielded=shielded, left=left_texts(replay, current)))
         if linked is not None:
             link_rules(view, linked)
     if shielded:
@@ -146,6 +148,19 @@ def at_step(played: Played, timeline: Timeline) -> None:
     for step in (current + 1, current - 1):
         if 0 <= step <= last:
             replay.png(step)
+
+
+def left_texts(replay: ReplayPair, step: int) -> list[str]:
+    """Of each action dimension what never-rules forbid at a step, and leave; "" for nothing."""
+    shield, steps = replay.shield, replay.steps
+    if shield is None or not shield.rule_set.forbids or steps.invalid[step] is not None:
+        return []
+    state = steps.observation[step]
+    found = [labels_left(shield, state, place) for place in range(len(replay.dimensions))]
+    return [
+        "" if left is None else left_text(left, shield.rule_set, place)
+        for place, left in enumerate(found)
+    ]
 
 
 def changes(replay: ReplayPair, current: int, mark: Markup) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from sarl_core.explaining.exports.export import rules_to_csv
 from sarl_core.explaining.words.evidence import remedy_text, shortfall_text
-from sarl_core.mining.action_words import action_text
+from sarl_core.mining.action_words import action_text, says_text
 from sarl_core.mining.rule_set import RuleSet, rules_to_json
 from sarl_core.mining.validation.holding_out import lower_bound, shortfall, with_lower_bound
 from sarl_dashboard.cache import cached
@@ -61,16 +61,19 @@ def listed_rules(rule_set: RuleSet) -> Listed:
     """What rules are found by; none of them is written in words for it."""
     rules = rule_set.rules
     names: dict[str, int] = {}
-    meant = {
-        (index, label): names.setdefault(action_text(label, dimension), len(names))
-        for index, dimension in enumerate(rule_set.actions)
-        for label in range(dimension.n_labels)
-    }
+    if not all(rule.forbids for rule in rules):  # else no rule says to do any of them
+        for dimension in rule_set.actions:
+            for label in range(dimension.n_labels):
+                names.setdefault(action_text(label, dimension), len(names))
+    does = [
+        names.setdefault(says_text(rule, rule_set.actions[rule.dimension]), len(names))
+        for rule in rules
+    ]
     samples = np.array([rule.samples for rule in rules], dtype=np.int64)
     return Listed(
         places=np.argsort(-samples, kind="stable"),
         place={rule.id: place for place, rule in enumerate(rules)},
-        does=np.array([meant[rule.dimension, rule.action] for rule in rules], dtype=np.int64),
+        does=np.array(does, dtype=np.int64),
         names=tuple(names),
         lower=np.array(list(map(lower_bound, rules)), dtype=np.float64),
         measures={

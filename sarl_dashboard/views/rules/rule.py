@@ -123,6 +123,11 @@ def path_of(place: TreePlace, in_force: InForce) -> tree_picture.PathInTree:
 
 def note_of(tree: PolicyTree, in_force: InForce) -> str:
     """What the boxes of a tree are."""
+    if in_force.rule_set.forbids:
+        return (
+            f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states, in "
+            "the colour of what the expert did most often. The lit path ends at the rule."
+        )
     return f"{counted(tree.n_nodes, 'node')}; each box is as wide as its share of the states. " + (
         "Rules are full in colour, what is cut off below them is grey."
         if in_force.compact is None

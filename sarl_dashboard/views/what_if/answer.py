@@ -21,9 +21,11 @@ from sarl_core.explaining.html.what_if import (
     way_html,
 )
 from sarl_core.explaining.html.what_if_bars import lines_html
+from sarl_core.explaining.words.leeway import left_text
 from sarl_core.explaining.words.what_if import node_of_way
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
+from sarl_core.shielding.leeway import labels_left
 from sarl_core.shielding.neighbourhood import DecisionChange, FeatureLine, decision_changes
 from sarl_dashboard.components.tree_picture import PathInTree, show_tree
 from sarl_dashboard.views.what_if.derived import derived_values
@@ -85,7 +87,10 @@ def answer(question: Question, beside: DeltaGenerator) -> None:
         index = decision.rules[dimension]
         rule = None if index is None else rule_set.rules[index]
         with st.container(border=True, key="decision"):
-            st.html(decision_html(decision, rule, state, rule_set, neighbourhood.shield.outside))
+            shield = neighbourhood.shield
+            left = labels_left(shield, state, dimension)
+            words = "" if left is None else left_text(left, rule_set, dimension)
+            st.html(decision_html(decision, rule, state, rule_set, shield.outside, left=words))
         with st.container(key="lines"):
             st.html(
                 lines_html(

@@ -16,7 +16,7 @@ from sarl_core.explaining.figures.rules.measures import RuleMeasure, measures_of
 from sarl_core.explaining.layouts import figure_layout
 from sarl_core.explaining.markup import plain
 from sarl_core.explaining.ticks import round_ticks, share_ticks, tick_text
-from sarl_core.mining.action_words import action_text, says_text
+from sarl_core.mining.action_words import says_text
 from sarl_core.mining.language import sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
@@ -107,14 +107,14 @@ def colour_entries(dots: Sequence[RuleDot], rule_set: RuleSet) -> list[list[tupl
     Returns:
         For each action dimension the actions that are drawn, and their colours as "#0072B2".
     """
-    there = {(rule.dimension, rule.action) for dot in dots for rule in dot.rules}
+    there = {
+        (rule.dimension, rule.label, says_text(rule, rule_set.actions[rule.dimension]))
+        for dot in dots
+        for rule in dot.rules
+    }
     return [
-        [
-            (action_text(label, dimension), label_colour(label))
-            for label in range(dimension.n_labels)
-            if (number, label) in there
-        ]
-        for number, dimension in enumerate(rule_set.actions)
+        [(text, label_colour(label)) for place, label, text in sorted(there) if place == number]
+        for number in range(len(rule_set.actions))
     ]
 
 
@@ -211,7 +211,7 @@ class _Ring(NamedTuple):
 
 def _rings(dot: RuleDot) -> list[_Ring]:
     """The outermost first."""
-    counts = sorted(Counter((rule.dimension, rule.action) for rule in dot.rules).items())
+    counts = sorted(Counter((rule.dimension, rule.label) for rule in dot.rules).items())
     left, rings = len(dot.rules), []
     for (dimension, label), count in counts:
         rings.append(_Ring(dimension, label, left))

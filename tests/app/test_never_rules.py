@@ -1,0 +1,111 @@
+"""Rules that forbid, as a rule file brings them, on the pages."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from streamlit.testing.v1 import AppTest
+
+from sarl_core import RuleSet, Shield, load_demonstrations
+from sarl_core.mining.never.never_rules import mine_never_rules
+from sarl_core.mining.rule_set import rules_to_json
+from sarl_core.shipped import DATA
+from tests.app.screens import (
+    ROUTER,
+    chosen_rules,
+    errors,
+    html,
+    metrics,
+    open_page,
+    page_file,
+    run_through,
+    texts,
+    upload_rules,
+)
+
+PROBED = DATA / "rules" / "lunar_lander_never.json"
+
+
+@pytest.fixture(scope="module")
+def mined() -> RuleSet:
+    lander = load_demonstrations(DATA / "demonstrations" / "lunar_lander.parquet")
+    return mine_never_rules(lander, epsilon=0.05, supp_min=0.005)
+
+
+def opened(page: str, rules: RuleSet | bytes, **query: str) -> AppTest:
+    """A page in another visit, by the address that an upload leaves."""
+    content = rules_to_json(rules).encode() if isinstance(rules, RuleSet) else rules
+    before = open_page("library", data="lunar_lander")
+    upload_rules(before, "never.json", content)
+    assert not errors(before)
+    app = AppTest.from_file(ROUTER, default_timeout=120)
+    for name, value in {"data": "lunar_lander", "set": chosen_rules(before), **query}.items():
+        app.query_params[name] = value
+    app.run()
+    app.switch_page(page_file(page)).run()
+    assert not app.exception, app.exception
+    return app
+
+
+def test_a_link_opens_the_rules_with_the_way_through_the_tree(mined: RuleSet) -> None:
+    app = opened("rules", mined)
+    table = app.dataframe[0].value
+    assert len(table) == len(mined)
+    assert {action for (action,) in table["Action"]} == {
+        f"never {name}" for name in mined.actions[0].label_names
+    }
+    assert "then never do nothing: the expert did not in 97.5 % of 9,682 states" in html(app)
+    assert "From the root to the rule" in html(app)
+    app.selectbox(key="action").set_value("never fire main engine").run()
+    kept = [rule for rule in mined if rule.forbids == (2,)]
+    assert len(app.dataframe[0].value) == len(kept) < len(mined)
+
+
+def test_rules_from_probes_say_what_the_expert_did_not_mend() -> None:
+    app = opened("rules", PROBED.read_bytes())
+    assert "after it the expert failed in 83 % of 430 states" in html(app)
+    assert "Not of the trees that the chosen demonstrations grow" in texts(app)
+
+
+def test_what_if_says_what_is_forbidden_and_what_is_left(mined: RuleSet) -> None:
+    app = opened("what_if", mined)
+    assert "Forbidden here: do nothing (R1). Left: fire left engine, fire main engine" in html(app)
+    assert "Freedom 79 %." in html(app)
+
+
+def test_a_replay_says_at_each_step_what_is_left(mined: RuleSet) -> None:
+    app = run_through(opened("replay", mined, step="3"), "replay")
+    assert "Forbidden here: " in html(app)
+    assert 0 < int(metrics(app)["Freedom"].split()[0]) < 100
+
+
+@pytest.mark.parametrize(
+    ("page", "what"),
+    [
+        ("difference", "The comparison of two rule sets"),
+        ("ablation", "Taking rules out one by one"),
+    ],
+)
+def test_pages_that_understand_demands_alone_say_so(mined: RuleSet, page: str, what: str) -> None:
+    (error,) = errors(opened(page, mined))
+    assert error.startswith(f"{what} understands rules that demand an action")
+
+
+def test_editing_understands_demands_alone(mined: RuleSet) -> None:
+    app = opened("edit", mined)
+    assert "Editing understands rules that demand an action" in texts(app)
+    assert not app.dataframe
+
+
+@pytest.mark.parametrize("page", ["episodes", "audit", "shield", "export", "library", "evidence"])
+def test_the_other_pages_take_them(mined: RuleSet, page: str) -> None:
+    assert not errors(opened(page, mined))
+
+
+def test_the_states_of_an_episode_are_as_the_shield_has_them(mined: RuleSet) -> None:
+    lander = load_demonstrations(DATA / "demonstrations" / "lunar_lander.parquet")
+    first = lander.select([0])
+    rules = Shield(mined).decide_batch(first.raw_observations, first.actions).rules
+    covered = np.mean(rules >= 0)
+    assert covered == 1.0
+    assert "Some rule applies in 100 % of them" in texts(opened("episodes", mined))
