@@ -12,8 +12,10 @@ from sarl_dashboard.components.elsewhere import elsewhere_notice
 from sarl_dashboard.components.hold_out import leave_out_choice
 from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.jobs import cross_fitting
+from sarl_dashboard.session import end_page
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.data import all_demonstrations, require_demonstrations
+from sarl_dashboard.state.thresholds import FORBID, chosen_mode
 from sarl_dashboard.views.evidence.contradictions import show_contradictions
 from sarl_dashboard.views.evidence.evidence import chosen_evidence
 from sarl_dashboard.views.evidence.held_out import hold_out_choice
@@ -28,6 +30,13 @@ st.caption(
     "how many of them, each counted once because its steps are alike."
 )
 require_demonstrations()
+if chosen_mode() == FORBID:
+    st.info(
+        "This page understands rules that demand an action, and those at the thresholds forbid "
+        "one; choose rules that demand on the page Thresholds.",
+        icon=":material/block:",
+    )
+    end_page()
 demonstrations = all_demonstrations()
 assert demonstrations is not None
 hold_out_choice(demonstrations)

@@ -15,10 +15,10 @@ from sarl_dashboard.state import in_force, rule_base
 from sarl_dashboard.state.compact_set import chosen_compact
 from sarl_dashboard.state.data import require_demonstrations
 from sarl_dashboard.state.mined import grown_trees, tried_on
-from sarl_dashboard.state.thresholds import chosen_divider, chosen_thresholds
+from sarl_dashboard.state.thresholds import FORBID, chosen_divider, chosen_mode, chosen_thresholds
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.thresholds.combinations import combinations_choice
-from sarl_dashboard.views.thresholds.controls import show_controls
+from sarl_dashboard.views.thresholds.controls import mode_choice, show_controls
 from sarl_dashboard.views.thresholds.display import DIVIDER, LARGEST, TRADE_OFFS, chosen_display
 from sarl_dashboard.views.thresholds.divider import show_divider
 from sarl_dashboard.views.thresholds.maps import show_maps, show_surfaces
@@ -30,10 +30,16 @@ demonstrations = require_demonstrations()
 trees = grown_trees(demonstrations, chosen_divider())
 compact = chosen_compact(demonstrations)
 take_over()
+forbids = chosen_mode() == FORBID
 st.caption(
-    "A rule must apply to at least a certain share of the states (support), and the expert must "
-    "have done the same in at least a certain share of those (confidence)."
+    "A rule must apply to at least a certain share of the states (support), and "
+    + (
+        "the expert must have done what it forbids in at most a certain share of those (epsilon)."
+        if forbids
+        else "the expert must have done the same in at least a certain share of those (confidence)."
+    )
 )
+mode_choice()
 without_edits_notice()
 if not rule_base.at_thresholds() and compact is None:
     st.caption(
@@ -49,21 +55,20 @@ if display.surfaces:
     show_surfaces(display, landscape, thresholds)
 else:
     show_maps(display, landscape)
-largest, trade_offs, *divider = st.tabs(
-    [LARGEST, TRADE_OFFS, *([DIVIDER] if display.is_divided else [])],
-    key="details",
-    on_change="rerun",
-    bind="query-params",
+# The best trade-offs are those of coverage and fidelity, and rules that forbid want freedom, too.
+names = [LARGEST, *([] if forbids else [TRADE_OFFS]), *([DIVIDER] if display.is_divided else [])]
+tabs = dict(
+    zip(names, st.tabs(names, key="details", on_change="rerun", bind="query-params"), strict=True)
 )
 table = None
-if trade_offs.open:
-    with trade_offs:
+if TRADE_OFFS in tabs and tabs[TRADE_OFFS].open:
+    with tabs[TRADE_OFFS]:
         show_trade_offs(display)
-elif divider and divider[0].open:
-    with divider[0]:
+elif DIVIDER in tabs and tabs[DIVIDER].open:
+    with tabs[DIVIDER]:
         show_divider(demonstrations, display.dimension)
 else:
-    table = largest.empty()
+    table = tabs[LARGEST].empty()
 with top:
     show_controls(display, landscape, table)
 cross_fitting.make_ready()

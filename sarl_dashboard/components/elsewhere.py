@@ -35,7 +35,7 @@ def elsewhere_notice(
         more: HTML to stand below.
     """
     demonstrations = chosen_demonstrations()
-    if demonstrations is None or not rule_base.at_thresholds():
+    if demonstrations is None or not rule_base.at_thresholds() or thresholds.never is not None:
         return
     if demonstrations.sample_of is not None:
         _notice_of_file(demonstrations, cross_fitting.judged(thresholds), fidelity, more)

@@ -9,7 +9,6 @@ import streamlit as st
 from sarl_core.environments.formulas import Formula
 from sarl_core.errors import SarlError
 from sarl_core.mining.language import counted, limit_text, threshold_text
-from sarl_core.mining.rules import FILTERED
 from sarl_dashboard.components.hold_out import parting_lines
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.session import end_page
@@ -26,9 +25,10 @@ from sarl_dashboard.state.rule_files import CHOSEN
 from sarl_dashboard.state.thresholds import (
     MIN_DIVIDER,
     choose_divider,
-    choose_thresholds,
     chosen_divider,
     chosen_thresholds,
+    keep_thresholds,
+    threshold_values,
 )
 from sarl_dashboard.state.url import say_in_url
 from sarl_dashboard.text import escaped, refuse, size_text
@@ -36,16 +36,10 @@ from sarl_dashboard.text import escaped, refuse, size_text
 
 def threshold_parameters() -> dict[str, str | None]:
     """What the URL says of the thresholds in force, also on pages that have no widgets for them."""
-    thresholds = chosen_thresholds()
+    values = threshold_values() | {"divider": (chosen_divider(), MIN_DIVIDER)}
     return {
         name: None if value == default else threshold_text(value)
-        for name, value, default in (
-            ("support", thresholds.support, FILTERED.support),
-            ("confidence", thresholds.confidence, FILTERED.confidence),
-            ("lift", thresholds.lift, 0.0),
-            ("depth", thresholds.max_depth or 0, 0),
-            ("divider", chosen_divider(), MIN_DIVIDER),
-        )
+        for name, (value, default) in values.items()
     }
 
 
@@ -148,7 +142,7 @@ def sidebar(*, with_thresholds: bool = True) -> None:
     name = chosen_dataset()
     thresholds, divider = chosen_thresholds(), chosen_divider()
     # A page without sliders keeps what a link says, for the page that has them.
-    choose_thresholds(thresholds)
+    keep_thresholds()
     choose_divider(divider)
     st.session_state["_went_back"] = False  # what the address says is chosen by now
     for parameter, value in threshold_parameters().items():
@@ -189,7 +183,9 @@ def sidebar(*, with_thresholds: bool = True) -> None:
             return
         lines = [
             f"Support at least **{limit_text(thresholds.support)}**",
-            f"Confidence at least **{limit_text(thresholds.confidence)}**",
+            f"Confidence at least **{limit_text(thresholds.confidence)}**"
+            if thresholds.never is None
+            else f"Rules that **forbid**, epsilon **{threshold_text(thresholds.never)}**",
         ]
         if not demonstrations.is_discrete:
             lines.append(f"Divider **{divider}**")

@@ -114,7 +114,8 @@ def frame(rules: Sequence[Rule], rule_set: RuleSet, names: Sequence[str]) -> Any
     columns["Action"] = [[action] for action in columns["Action"]]
     columns["Rule"] = list(names)
     order: tuple[str, ...] = ("Rule", "Action", "When")
-    tried = held_out_columns(rules, rule_set.thresholds.confidence)
+    at = rule_set.thresholds
+    tried = held_out_columns(rules, at.confidence if at.never is None else 1.0 - at.never)
     if tried:
         tried["Verdict"] = [[word] for word in tried["Verdict"]]
         # Next to what they compare with; the rarer measures go to the end.

@@ -46,8 +46,10 @@ def judged(thresholds: Thresholds) -> Judged | None:
 
     Returns:
         Of mined rules alone: a compact set was built from other states. Of a mined file what the
-        episodes say that were held out when it was mined.
+        episodes say that were held out when it was mined. None of rules that forbid.
     """
+    if thresholds.never is not None:
+        return None
     mined = mined_data()
     if mined is not None:
         return _judged_in_file(mined, thresholds) if rule_base.at_thresholds() else None

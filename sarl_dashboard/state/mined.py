@@ -14,6 +14,8 @@ from sarl_core.mining.editing.renaming import renamed_trees
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.evidence import EpisodeCounts
 from sarl_core.mining.growing.growth import grow_policy_trees, learner_for
+from sarl_core.mining.never.landscape import NeverLandscape, never_landscape
+from sarl_core.mining.never.never_rules import mine_never_rules
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import Landscape, threshold_landscape
@@ -110,7 +112,7 @@ def mined_rules(trees: Trees, thresholds: Thresholds, parts: Parts | None) -> Ru
         InputError: If the trees of a mined file do not reach down to the support.
     """
     mined = mined_data()
-    if mined is not None and mined.trees == trees:
+    if mined is not None and mined.trees == trees and thresholds.never is None:
         return _rules_of_file(mined, thresholds)
     return _mined_rules(trees, thresholds, parts)
 
@@ -127,13 +129,21 @@ def _rules_of_file(mined: MinedData, thresholds: Thresholds) -> RuleSet:
 
 @cached()
 def _mined_rules(trees: Trees, thresholds: Thresholds, parts: Parts | None) -> RuleSet:
-    rule_set = mine_rules(
-        trees,
-        supp_min=thresholds.support,
-        conf_min=thresholds.confidence,
-        lift_min=thresholds.lift,
-        max_depth=thresholds.max_depth,
-    )
+    if thresholds.never is not None:
+        rule_set = mine_never_rules(
+            trees,
+            epsilon=thresholds.never,
+            supp_min=thresholds.support,
+            max_depth=thresholds.max_depth,
+        )
+    else:
+        rule_set = mine_rules(
+            trees,
+            supp_min=thresholds.support,
+            conf_min=thresholds.confidence,
+            lift_min=thresholds.lift,
+            max_depth=thresholds.max_depth,
+        )
     if parts is None or parts.mined.whole.digest != rule_set.source.digest:
         return rule_set
     boxed = with_boxes(rule_set, parts.mined)
@@ -206,6 +216,14 @@ def mined_landscape(
     return threshold_landscape(
         trees, supports, confidences, lift_min=lift, max_depth=depth, held_out=counts
     )
+
+
+@cached()
+def mined_never_landscape(
+    trees: Trees, supports: tuple[float, ...], epsilons: tuple[float, ...], *, depth: int | None
+) -> NeverLandscape:
+    """The landscape of rules that forbid over a grid."""
+    return never_landscape(trees, supports, epsilons, max_depth=depth)
 
 
 @cached()

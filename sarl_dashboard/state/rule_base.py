@@ -32,7 +32,14 @@ from sarl_dashboard.state.rule_files import (
     rules_in_file,
     unnamed_compact_rules,
 )
-from sarl_dashboard.state.thresholds import MIN_DIVIDER, THRESHOLDS, chosen_divider
+from sarl_dashboard.state.thresholds import (
+    DEMAND,
+    FORBID,
+    MIN_DIVIDER,
+    THRESHOLDS,
+    chosen_divider,
+    chosen_mode,
+)
 from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import digest_of
 
@@ -137,7 +144,9 @@ def base_key(name: str) -> str:
 def _thresholds_key() -> str:
     demonstrations = chosen_demonstrations()
     discrete = demonstrations is None or demonstrations.is_discrete
-    return repr((data_key(), MIN_DIVIDER if discrete else chosen_divider()))
+    key = repr((data_key(), MIN_DIVIDER if discrete else chosen_divider()))
+    # Rules that forbid have other numbers than those that demand.
+    return key if chosen_mode() == DEMAND else f"{key} {FORBID}"
 
 
 def _fixed_base(name: str) -> Base:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, cast
 
 import streamlit as st
 
 from sarl_core.mining.growing.growth import LearnerChoice
+from sarl_core.mining.never.never_rules import never_thresholds
+from sarl_core.mining.never.steps import USUAL_EPSILON
 from sarl_core.mining.rules import FILTERED, Thresholds
 from sarl_dashboard.state.url import note_unusable, set_url_choice, url_choice
 
@@ -16,8 +18,10 @@ THRESHOLDS = "thresholds"
 """In an address: the rules are those at the thresholds."""
 MIN_DIVIDER, MAX_DIVIDER = 2, 16
 LEARNERS: tuple[LearnerChoice, ...] = ("auto", "exact", "histogram")
+DEMAND, FORBID = "demand", "forbid"
 MAX_LIFT = 20.0
 MAX_DEPTH = 64  # 0 is no limit
+_LEAST_EPSILON = 0.0001
 
 
 class Settled(NamedTuple):
@@ -71,28 +75,77 @@ def _number(name: str, default: float, low: float, high: float) -> float:
     return number
 
 
+def chosen_mode() -> str:
+    """Whether rules at the thresholds demand an action or forbid one (URL: mode)."""
+    return url_choice("mode", (DEMAND, FORBID), DEMAND)
+
+
+def choose_mode(mode: str) -> None:
+    """Choose between rules that demand and rules that forbid; for callbacks."""
+    set_url_choice("mode", mode, DEMAND)
+
+
+def chosen_confidence() -> float:
+    """The minimum confidence of rules that demand, in force or set aside (URL: confidence)."""
+    return _number("confidence", FILTERED.confidence, 0.0, 1.0)
+
+
+def chosen_epsilon() -> float:
+    """The epsilon of rules that forbid, in force or set aside (URL: epsilon)."""
+    return _number("epsilon", USUAL_EPSILON, _LEAST_EPSILON, 1.0 - _LEAST_EPSILON)
+
+
 def chosen_limits() -> tuple[float, int | None]:
     """Minimum lift and maximum depth in force (URL: lift, depth; depth 0 is no limit)."""
     return _number("lift", 0.0, 0.0, MAX_LIFT), int(_number("depth", 0, 0, MAX_DEPTH)) or None
 
 
 def chosen_thresholds() -> Thresholds:
-    """The thresholds in force (URL: support, confidence, and those of `chosen_limits`)."""
-    return Thresholds(
-        max(_number("support", FILTERED.support, 0.0, 1.0), least_support()),
-        _number("confidence", FILTERED.confidence, 0.0, 1.0),
-        *chosen_limits(),
-    )
+    """The thresholds in force (URL: support, confidence, and those of `chosen_limits`).
+
+    Of rules that forbid those of `never_thresholds`, which know no confidence and no lift.
+    """
+    support = max(_number("support", FILTERED.support, 0.0, 1.0), least_support())
+    lift, depth = chosen_limits()
+    if chosen_mode() == FORBID:
+        return never_thresholds(chosen_epsilon(), support, depth)
+    return Thresholds(support, chosen_confidence(), lift, depth)
+
+
+def threshold_values() -> dict[str, tuple[float, float]]:
+    """Every threshold by its name in the URL, in force or set aside, and its default."""
+    thresholds, (lift, depth) = chosen_thresholds(), chosen_limits()
+    return {
+        "support": (thresholds.support, FILTERED.support),
+        "confidence": (chosen_confidence(), FILTERED.confidence),
+        "lift": (lift, 0.0),
+        "depth": (depth or 0, 0),
+        "epsilon": (chosen_epsilon(), USUAL_EPSILON),
+    }
+
+
+def keep_thresholds() -> None:
+    """Let every threshold stay what it is, before the sliders are drawn, or where there are none.
+
+    Those that are set aside stay, too.
+    """
+    _put({name: value for name, (value, _) in threshold_values().items()})
 
 
 def choose_thresholds(thresholds: Thresholds) -> None:
-    """Put thresholds in force; for callbacks, and before the sliders are drawn."""
-    for name, value in (
-        ("support", thresholds.support),
-        ("confidence", thresholds.confidence),
-        ("lift", thresholds.lift),
-        ("depth", thresholds.max_depth or 0),
-    ):
+    """Put thresholds of rules that demand in force; for callbacks."""
+    _put(
+        {
+            "support": thresholds.support,
+            "confidence": thresholds.confidence,
+            "lift": thresholds.lift,
+            "depth": thresholds.max_depth or 0,
+        }
+    )
+
+
+def _put(values: Mapping[str, float]) -> None:
+    for name, value in values.items():
         if st.session_state.get(name) != value:
             st.session_state[name] = value
 

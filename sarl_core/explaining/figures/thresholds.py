@@ -81,7 +81,7 @@ def heatmap(
     Returns:
         Support to the right, confidence upwards; of never-rules epsilon.
     """
-    style = (STYLES | NEVER_LAYERS)[layer]
+    style = styles_of(landscape)[layer]
     across, word, title = _upwards(landscape)
     values = np.asarray(getattr(landscape, layer), dtype=np.float64)
     figure = go.Figure()
@@ -170,7 +170,14 @@ def position(value: float, grid: ArrayLike) -> float:
     return float(np.interp(value, grid, np.arange(len(grid))))
 
 
-def mark_place(landscape: Landscape, support: float, confidence: float) -> tuple[float, float]:
+def styles_of(landscape: Landscape | NeverLandscape) -> dict[Layer, LayerStyle]:
+    """How the layers of a landscape are shown."""
+    return NEVER_LAYERS if isinstance(landscape, NeverLandscape) else STYLES
+
+
+def mark_place(
+    landscape: Landscape | NeverLandscape, support: float, confidence: float
+) -> tuple[float, float]:
     """Where thresholds stand in a heatmap, as shares of its width and height.
 
     For a mark that is laid over the figure: moving it costs nothing, while a figure that changes
@@ -179,18 +186,19 @@ def mark_place(landscape: Landscape, support: float, confidence: float) -> tuple
     Args:
         landscape: What the heatmap shows.
         support: Minimum support.
-        confidence: Minimum confidence.
+        confidence: Minimum confidence; of never-rules epsilon.
 
     Returns:
         From the left and from the top of the area within `MARGIN`, each 0 to 1.
     """
     across = (position(support, landscape.supports) + 0.5) / len(landscape.supports)
-    upwards = (position(confidence, landscape.confidences) + 0.5) / len(landscape.confidences)
+    rows, _, _ = _upwards(landscape)
+    upwards = (position(confidence, rows) + 0.5) / len(rows)
     return across, 1.0 - upwards
 
 
 def surface(
-    landscape: Landscape,
+    landscape: Landscape | NeverLandscape,
     layer: Layer,
     *,
     dark: bool = False,
@@ -202,16 +210,17 @@ def surface(
         landscape: Over a grid.
         layer: Which of its layers.
         dark: Whether it stands on dark ground.
-        chosen: Support, confidence and height of a point to mark.
+        chosen: Support, confidence (of never-rules epsilon) and height of a point to mark.
 
     Returns:
         To be turned with the mouse.
     """
-    style = STYLES[layer]
+    style = styles_of(landscape)[layer]
+    upwards, word, title = _upwards(landscape)
     values = np.asarray(getattr(landscape, layer), dtype=np.float64)
     ink = "#c5d0d8" if dark else "#3b4954"
     columns = np.arange(len(landscape.supports))
-    rows = np.arange(len(landscape.confidences))
+    rows = np.arange(len(upwards))
     figure = go.Figure()
     figure.add_surface(
         x=columns,
@@ -221,7 +230,7 @@ def surface(
         showscale=False,
         customdata=np.moveaxis(_cell_data(landscape).reshape(len(columns), len(rows), -1), 0, 1),
         hovertemplate=(
-            "support %{customdata[0]}, confidence %{customdata[1]}<br>"
+            f"support %{{customdata[0]}}, {word} %{{customdata[1]}}<br>"
             "<b>rules %{customdata[2]:,}</b>, mean length %{customdata[3]}<br>"
             "coverage %{customdata[4]}, fidelity %{customdata[5]}%{customdata[6]}<extra></extra>"
         ),
@@ -229,7 +238,7 @@ def surface(
     if chosen is not None and np.isfinite(chosen[2]):
         figure.add_scatter3d(
             x=[position(chosen[0], landscape.supports)],
-            y=[position(chosen[1], landscape.confidences)],
+            y=[position(chosen[1], upwards)],
             z=[chosen[2]],
             mode="markers",
             marker={"size": 6, "color": MARKER_COLOUR},
@@ -243,7 +252,7 @@ def surface(
         "zeroline": False,
     }
     across = _axis("Minimum support", landscape.supports, most=5)
-    along = _axis("Minimum confidence", landscape.confidences, most=5)
+    along = _axis(title, upwards, most=5)
     keep = ("tickmode", "tickvals", "ticktext", "range")
     figure.update_layout(
         height=420,
@@ -251,7 +260,7 @@ def surface(
         paper_bgcolor="rgba(0,0,0,0)",
         scene={
             "xaxis": {key: across[key] for key in keep} | plain | {"title": {"text": "support"}},
-            "yaxis": {key: along[key] for key in keep} | plain | {"title": {"text": "confidence"}},
+            "yaxis": {key: along[key] for key in keep} | plain | {"title": {"text": word}},
             "zaxis": {
                 "title": {"text": style.unit or layer},
                 "rangemode": "tozero",

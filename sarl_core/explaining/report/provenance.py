@@ -19,6 +19,7 @@ from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.mining.growing.growth import EXACT_UP_TO
 from sarl_core.mining.language import counted, threshold_text
+from sarl_core.mining.never.never_rules import mine_never_rules, with_never_rules
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.mining.rules import NAMED_SETTINGS
 from sarl_core.mining.tree import PolicyTree
@@ -167,7 +168,10 @@ def _limits(rule_set: RuleSet) -> dict[str, object]:
     return {
         "--setting": named,
         "--support": None if named else threshold_text(limits.support),
-        "--confidence": None if named else threshold_text(limits.confidence),
+        "--confidence": None
+        if named or _forbids_alone(rule_set)
+        else threshold_text(limits.confidence),
+        "--never": None if limits.never is None else threshold_text(limits.never),
         "--lift": threshold_text(limits.lift) if limits.lift else None,
         "--max-depth": limits.max_depth,
     }
@@ -223,6 +227,27 @@ def commands_that_hold(
     return tuple(line for line in commands if not line.startswith(mining))
 
 
+def _mined(trees: Sequence[PolicyTree], rule_set: RuleSet) -> RuleSet:
+    """The rules of trees at the thresholds of others, and of the same kind."""
+    limits = rule_set.thresholds
+    if limits.never is not None and _forbids_alone(rule_set):
+        return mine_never_rules(
+            trees, epsilon=limits.never, supp_min=limits.support, max_depth=limits.max_depth
+        )
+    demanding = mine_rules(
+        trees,
+        supp_min=limits.support,
+        conf_min=limits.confidence,
+        lift_min=limits.lift,
+        max_depth=limits.max_depth,
+    )
+    return demanding if limits.never is None else with_never_rules(demanding, trees, limits.never)
+
+
+def _forbids_alone(rule_set: RuleSet) -> bool:
+    return rule_set.forbids and all(rule.forbids for rule in rule_set.rules)
+
+
 def mined_again(rule_set: RuleSet, trees: Sequence[PolicyTree] | None) -> bool:
     """Whether trees give the same rules, under the same names.
 
@@ -235,16 +260,12 @@ def mined_again(rule_set: RuleSet, trees: Sequence[PolicyTree] | None) -> bool:
     """
     if not trees:
         return False
-    limits = rule_set.thresholds
-    again = mine_rules(
-        trees,
-        supp_min=limits.support,
-        conf_min=limits.confidence,
-        lift_min=limits.lift,
-        max_depth=limits.max_depth,
-    )
+    again = _mined(trees, rule_set)
     one, other = (
-        [(rule.id, rule.dimension, rule.conditions, rule.action) for rule in rules.rules]
+        [
+            (rule.id, rule.dimension, rule.conditions, rule.action, rule.forbids)
+            for rule in rules.rules
+        ]
         for rules in (again, rule_set)
     )
     return one == other and (again.actions, again.source.features) == (

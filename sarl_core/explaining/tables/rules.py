@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from sarl_core.mining.action_words import says_text
 from sarl_core.mining.algorithm_1 import cut_nodes, rules_at
 from sarl_core.mining.language import conditions_text
+from sarl_core.mining.never.never_rules import mine_never_rules
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds, name_at
 from sarl_core.mining.tree import PolicyTree, source_of
@@ -37,8 +39,11 @@ def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) ->
         most: Number of rules to keep of each action dimension.
 
     Returns:
-        A part of what `mine_rules` gives, the most support first.
+        A part of what `mine_rules` gives, the most support first; of `mine_never_rules` where
+        there is an epsilon.
     """
+    if thresholds.never is not None:
+        return _top_never_rules(trees, thresholds, most)
     top: list[tuple[Rule, str]] = []
     before = 0
     for tree in trees:
@@ -62,6 +67,17 @@ def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) ->
         divider=trees[0].divider,
     )
     return TopRules(part, tuple(name for _, name in top))
+
+
+def _top_never_rules(trees: Sequence[PolicyTree], at: Thresholds, most: int) -> TopRules:
+    """The same of rules that forbid, of which there are few enough to make them all."""
+    assert at.never is not None
+    every = mine_never_rules(trees, epsilon=at.never, supp_min=at.support, max_depth=at.max_depth)
+    top: list[Rule] = []
+    for dimension in range(len(trees)):
+        top += sorted(every.of_dimension(dimension), key=lambda rule: -rule.samples)[:most]
+    top.sort(key=lambda rule: -rule.samples)
+    return TopRules(replace(every, rules=tuple(top)), tuple(map(every.name_of, top)))
 
 
 def rule_columns(rules: Sequence[Rule], rule_set: RuleSet) -> dict[str, list[object]]:

@@ -13,6 +13,7 @@ from sarl_core.errors import InputError
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.mining.combining.candidates import Pair
+from sarl_core.mining.rule_set import require_demands
 from sarl_core.mining.rules import Thresholds
 from sarl_core.rollouts.choices import check_choice
 from sarl_core.rollouts.seeds import FRESH
@@ -68,6 +69,11 @@ def order_of(choices: ImproveChoices, demonstrations: Demonstrations) -> Improve
     thresholds = None
     if choices.cut == AT_THRESHOLDS:
         in_force = chosen_thresholds()
+        if in_force.never is not None:
+            raise InputError(
+                "rounds are cut at thresholds of rules that demand an action, and those in force "
+                "forbid one; choose rules that demand on the page Thresholds, or another cut"
+            )
         thresholds = Thresholds(in_force.support, in_force.confidence)
     start, combined = uncombined_start(demonstrations, env_id)
     plan = Plan(
@@ -115,6 +121,7 @@ def gaps_order(
     """Which states need a demonstration, at the thresholds in force."""
     trees = grown_trees(demonstrations, choices.divider)
     rules = mined_rules(trees, chosen_thresholds(), data_parts())
+    require_demands(rules, "finding gaps")
     plan = Plan(
         MIN_RULES,
         rounds=1,

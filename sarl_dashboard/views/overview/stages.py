@@ -105,9 +105,10 @@ def _rules() -> Stage:
     if not rule_base.at_thresholds():
         return Stage("Rules", True, f"{in_force.title()} chosen", "thresholds.py")
     thresholds = chosen_thresholds()
-    at = (
-        f"support at least {limit_text(thresholds.support)}, confidence at least "
-        f"{limit_text(thresholds.confidence)}"
+    at = f"support at least {limit_text(thresholds.support)}, " + (
+        f"confidence at least {limit_text(thresholds.confidence)}"
+        if thresholds.never is None
+        else f"forbidden what the expert does in at most {limit_text(thresholds.never)}"
     )
     moved = thresholds != FILTERED
     return Stage(

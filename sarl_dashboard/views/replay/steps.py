@@ -156,10 +156,10 @@ def left_texts(replay: ReplayPair, step: int) -> list[str]:
     if shield is None or not shield.rule_set.forbids or steps.invalid[step] is not None:
         return []
     state = steps.observation[step]
-    found = [labels_left(shield, state, place) for place in range(len(replay.dimensions))]
+    each = [labels_left(shield, state, place) for place in range(len(replay.dimensions))]
     return [
         "" if left is None else left_text(left, shield.rule_set, place)
-        for place, left in enumerate(found)
+        for place, left in enumerate(each)
     ]
 
 

@@ -44,7 +44,8 @@ def show_rule(rule: Rule, in_force: InForce, buttons: Callable[[], None]) -> Non
     with st.container(border=True, key="sentence"):
         buttons()
         at_thresholds = rule_base.at_thresholds() and rule.origin == "mined"
-        threshold = in_force.thresholds.confidence if at_thresholds else None
+        demands = at_thresholds and not rule.forbids
+        threshold = in_force.thresholds.confidence if demands else None
         st.html(rule_card(rule, in_force.rule_set, threshold=threshold))
         if compact is not None and not in_force.edits:
             show_origin(compact.as_shipped(rule), compact.shipped)
@@ -62,7 +63,7 @@ def show_rule(rule: Rule, in_force: InForce, buttons: Callable[[], None]) -> Non
                 "came into by itself and was asked about.",
                 icon=":material/explore:",
             )
-        if not rule.conditions and at_thresholds:
+        if not rule.conditions and demands:
             st.info(
                 "This rule has no conditions: over all states the expert's most frequent action "
                 "is already as frequent as the minimum confidence asks, so the tree is cut at "

@@ -42,6 +42,16 @@ ORDERS = {
 
 def nothing_in_force(thresholds: Thresholds) -> None:
     """What to do where no rule is in force."""
+    if thresholds.never is not None:
+        st.info(
+            f"No part of the tree has a support of at least {limit_text(thresholds.support)} and "
+            "an action whose share there is shown to be at most "
+            f"{limit_text(thresholds.never)}, so nothing is forbidden. Lower the minimum support "
+            "or raise epsilon on the Thresholds page, whose maps show where there are rules.",
+            icon=":material/filter_alt_off:",
+        )
+        st.page_link("thresholds.py", label="Go to Thresholds", icon=":material/arrow_forward:")
+        return
     st.info(
         f"No part of the tree has a support of at least {limit_text(thresholds.support)} and a "
         f"confidence of at least {limit_text(thresholds.confidence)}, so there is no rule. "

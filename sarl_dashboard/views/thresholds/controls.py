@@ -10,6 +10,8 @@ from streamlit.delta_generator import DeltaGenerator
 
 from sarl_core.explaining.figures.thresholds import mark_place
 from sarl_core.mining.language import threshold_text
+from sarl_core.mining.never.landscape import NeverLandscape
+from sarl_core.mining.never.steps import EPSILON_STEPS, USUAL_EPSILON
 from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
 from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_core.mining.thresholds.steps import (
@@ -19,7 +21,7 @@ from sarl_core.mining.thresholds.steps import (
     with_step,
 )
 from sarl_dashboard.components.elsewhere import elsewhere_notice
-from sarl_dashboard.components.journey.words import word_help
+from sarl_dashboard.components.journey.words import with_words, word_help
 from sarl_dashboard.components.places import placed
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import rule_base
@@ -31,8 +33,12 @@ from sarl_dashboard.state.rule_files import (
     compact_sets,
 )
 from sarl_dashboard.state.thresholds import (
+    DEMAND,
+    FORBID,
     MAX_DIVIDER,
     MIN_DIVIDER,
+    chosen_epsilon,
+    chosen_mode,
     chosen_thresholds,
     from_least,
     least_support,
@@ -48,6 +54,7 @@ from sarl_dashboard.views.thresholds.moves import (
     take_over,
     use,
     use_compact,
+    use_mode,
 )
 from sarl_dashboard.views.thresholds.numbers import show_numbers
 from sarl_dashboard.views.thresholds.recommendation import show_recommendation
@@ -57,8 +64,33 @@ _TOO_LOW = ". The trees of this file do not reach so far down; mine its steps ag
 _SHORT = {COMPACT: "Compact", COMBINED: "Two features", FEWEST: "Fewest"}
 
 
+_MODES = {DEMAND: "Rules that demand", FORBID: "Rules that forbid"}
+
+
+def mode_choice() -> None:
+    """Whether rules at the thresholds say what to do, or what never to do (URL: mode)."""
+    # The widget follows the URL, so a link and the browser's "back" both reach it.
+    st.session_state["_mode_choice"] = chosen_mode()
+    st.segmented_control(
+        "Kind of rules",
+        list(_MODES),
+        format_func=_MODES.__getitem__,
+        key="_mode_choice",
+        on_change=lambda: use_mode(st.session_state["_mode_choice"]),
+        required=True,
+        label_visibility="collapsed",
+        help=with_words(
+            "Rules that demand say what to do. Rules that forbid, never-rules, say what not to do "
+            "and leave the rest to whoever acts. Rarely done is not unsafe: they say what the "
+            "expert had no need of."
+        ),
+    )
+
+
 @st.fragment(key="controls")
-def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator | None) -> None:
+def show_controls(
+    display: Display, landscape: Landscape | NeverLandscape, table: DeltaGenerator | None
+) -> None:
     """Sliders, named settings and jumps; the numbers of the rule set; the mark; the table.
 
     Args:
@@ -73,7 +105,7 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
     moved: Callable[[], None] | Literal["rerun"] = (
         leave_compact if not rule_base.at_thresholds() else "rerun" if alone else follow
     )
-    jumps = neat_jumps(display.trees, thresholds)
+    jumps = None if display.forbids else neat_jumps(display.trees, thresholds)
     left, middle, right = st.columns([4, 4, 3])
     with left:
         st.select_slider(
@@ -86,22 +118,26 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
             on_change=moved,
             help=word_help("support", "Here: how much of it a rule must have at least."),
         )
-        below = jumps.support_below
-        if below is not None and below < least_support():
-            below = None
-        jump_buttons("support", below, jumps.support_above)
+        if jumps is not None:
+            below = jumps.support_below
+            if below is not None and below < least_support():
+                below = None
+            jump_buttons("support", below, jumps.support_above)
     with middle:
-        st.select_slider(
-            "Minimum confidence",
-            with_step(CONFIDENCE_STEPS, thresholds.confidence),
-            key="confidence",
-            value=FILTERED.confidence,
-            format_func=threshold_text,
-            bind="query-params",
-            on_change=moved,
-            help=word_help("confidence", "Here: how much of it a rule must have at least."),
-        )
-        jump_buttons("confidence", jumps.confidence_below, jumps.confidence_above)
+        if jumps is None:
+            epsilon_slider(moved)
+        else:
+            st.select_slider(
+                "Minimum confidence",
+                with_step(CONFIDENCE_STEPS, thresholds.confidence),
+                key="confidence",
+                value=FILTERED.confidence,
+                format_func=threshold_text,
+                bind="query-params",
+                on_change=moved,
+                help=word_help("confidence", "Here: how much of it a rule must have at least."),
+            )
+            jump_buttons("confidence", jumps.confidence_below, jumps.confidence_above)
     with right:
         if display.is_divided and settled() is not None:
             st.metric("Divider", f"{display.trees[0].divider}", help=word_help("divider", _SETTLED))
@@ -116,7 +152,8 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
                 on_change=leave_compact,
                 help=word_help("divider"),
             )
-        named_settings(thresholds, rule_base.compact_name() if display.compact else None)
+        if not display.forbids:
+            named_settings(thresholds, rule_base.compact_name() if display.compact else None)
     stay_beside()
     point = display.point(thresholds)
     everything = display.dimension is None
@@ -127,13 +164,33 @@ def show_controls(display: Display, landscape: Landscape, table: DeltaGenerator 
     )
     if everything:
         elsewhere_notice(thresholds, float(point.fidelity[0, 0]))
-    show_recommendation(display, thresholds)
-    across, down = mark_place(landscape, thresholds.support, thresholds.confidence)
+    if not display.forbids:
+        show_recommendation(display, thresholds)
+    upwards = thresholds.confidence if thresholds.never is None else thresholds.never
+    across, down = mark_place(landscape, thresholds.support, upwards)
     ring = "block" if display.compact is None else "none"
     st.html(placed("maps", across=f"{across:.5f}", down=f"{down:.5f}", ring=ring))
     if table is not None:
         with table.container():
             show_largest(display, thresholds, int(point.rule_count[0, 0]))
+
+
+def epsilon_slider(moved: Callable[[], None] | Literal["rerun"]) -> None:
+    """The threshold of rules that forbid.
+
+    Args:
+        moved: What happens when it was moved.
+    """
+    st.select_slider(
+        "Epsilon",
+        with_step(EPSILON_STEPS, chosen_epsilon()),
+        key="epsilon",
+        value=USUAL_EPSILON,
+        format_func=threshold_text,
+        bind="query-params",
+        on_change=moved,
+        help=word_help("epsilon", "Keep it small: a large one forbids too early."),
+    )
 
 
 def jump_buttons(name: str, below: float | None, above: float | None) -> None:

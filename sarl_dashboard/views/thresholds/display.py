@@ -13,6 +13,8 @@ from sarl_core.explaining.words.growth import LEARNERS
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.growing.growth import EXACT_UP_TO
 from sarl_core.mining.growing.histogram import BINS
+from sarl_core.mining.never.landscape import NeverLandscape
+from sarl_core.mining.never.steps import FINE_EPSILONS
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS, Landscape
@@ -22,12 +24,15 @@ from sarl_dashboard.components.journey.words import with_words, word_help
 from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.compact_set import Compact
-from sarl_dashboard.state.mined import mined_landscape
+from sarl_dashboard.state.mined import mined_landscape, mined_never_landscape
 from sarl_dashboard.state.thresholds import (
+    DEMAND,
+    FORBID,
     MAX_DEPTH,
     MAX_LIFT,
     choose_learner,
     chosen_learner,
+    chosen_mode,
     from_least,
     settled,
 )
@@ -37,10 +42,17 @@ FINE, PAPER = "Fine grid", "Paper's grid"
 LARGEST, TRADE_OFFS, DIVIDER = "Largest rules", "Best trade-offs", "Divider"
 WHOLE = "All actions"
 SIZE, QUALITY, HELD_OUT = "Rules and length", "Coverage and fidelity", "Held out"
+LEFT = "Rules and freedom"
 LAYERS: dict[str, tuple[Layer, Layer]] = {
     SIZE: ("rule_count", "mean_length"),
     QUALITY: ("coverage", "fidelity"),
     HELD_OUT: ("fidelity", "held_out_fidelity"),
+}
+
+
+NEVER_LAYERS: dict[str, tuple[Layer, Layer]] = {
+    LEFT: ("rule_count", "freedom"),
+    QUALITY: ("coverage", "fidelity"),
 }
 
 
@@ -56,6 +68,7 @@ class Display:
         layers: What the two figures show.
         surfaces: Whether as the paper's surfaces, and not as maps.
         paper_grid: Whether on the paper's grid.
+        forbids: Whether rules at the thresholds forbid.
     """
 
     trees: tuple[PolicyTree, ...]
@@ -65,24 +78,27 @@ class Display:
     layers: tuple[Layer, Layer]
     surfaces: bool
     paper_grid: bool
+    forbids: bool
 
     @property
     def is_divided(self) -> bool:
         """Whether the actions are continuous, and the divider says what labels there are."""
         return self.trees[0].dimension.is_interval
 
-    def landscape(self, thresholds: Thresholds) -> Landscape:
+    def landscape(self, thresholds: Thresholds) -> Landscape | NeverLandscape:
         """The landscape over the grid.
 
         Args:
             thresholds: Those in force; only lift and depth count.
         """
+        if self.forbids:
+            return self._never(from_least(FINE_SUPPORTS), FINE_EPSILONS, thresholds)
         supports, confidences = FINE_SUPPORTS, FINE_CONFIDENCES
         if self.paper_grid:
             supports, confidences = tuple(PAPER_SUPPORTS), tuple(PAPER_CONFIDENCES)
         return self._part(from_least(supports), confidences, thresholds)
 
-    def point(self, thresholds: Thresholds) -> Landscape:
+    def point(self, thresholds: Thresholds) -> Landscape | NeverLandscape:
         """The numbers in force, in the shape of a landscape of one point.
 
         Args:
@@ -90,7 +106,15 @@ class Display:
         """
         if self.compact is not None:
             return _compact_point(self.compact.counted, self.dimension)
+        if thresholds.never is not None:
+            return self._never((thresholds.support,), (thresholds.never,), thresholds)
         return self._part((thresholds.support,), (thresholds.confidence,), thresholds)
+
+    def _never(
+        self, supports: tuple[float, ...], epsilons: tuple[float, ...], limits: Thresholds
+    ) -> NeverLandscape:
+        whole = mined_never_landscape(self.trees, supports, epsilons, depth=limits.max_depth)
+        return whole if self.dimension is None else whole.dimensions[self.dimension]
 
     def _part(
         self, supports: tuple[float, ...], confidences: tuple[float, ...], limits: Thresholds
@@ -133,37 +157,47 @@ def chosen_display(
         compact: The compact rules where they are in force.
         held_out: The episodes held out, or the file that counted them; None where there are none.
     """
+    forbids = chosen_mode() == FORBID
     with st.container(horizontal=True, gap="medium", vertical_alignment="center", key="ways"):
-        pairs = [SIZE, QUALITY] if held_out is None else list(LAYERS)
-        pair = switch("Show", "layer", pairs, "What the two figures show")
+        if forbids:
+            layers, grid = NEVER_LAYERS, FINE  # the paper knows no such rules
+            pair = switch("Show", "left", list(layers), "What the two figures show")
+        else:
+            layers = LAYERS
+            pairs = [SIZE, QUALITY] if held_out is None else list(layers)
+            pair = switch("Show", "layer", pairs, "What the two figures show")
         view = switch("View", "view", [MAPS, SURFACES], "Maps, or the paper's surfaces")
-        grid = switch(
-            "Grid",
-            "grid",
-            [FINE, PAPER],
-            "Fine: dense where most happens. The paper's: 0 to 0.5 and 0 to 1 by 0.05.",
-        )
+        if not forbids:
+            grid = switch(
+                "Grid",
+                "grid",
+                [FINE, PAPER],
+                "Fine: dense where most happens. The paper's: 0 to 0.5 and 0 to 1 by 0.05.",
+            )
         more()
         dimension = chosen_dimension([tree.dimension.name for tree in trees])
     return Display(
-        trees, compact, held_out, dimension, LAYERS[pair], view == SURFACES, grid == PAPER
+        trees, compact, held_out, dimension, layers[pair], view == SURFACES, grid == PAPER, forbids
     )
 
 
 def more() -> None:
     """What changes the whole plane, and is rarely needed."""
     with st.popover("More", icon=":material/tune:"):
-        st.slider(
-            "Minimum lift",
-            0.0,
-            MAX_LIFT,
-            value=0.0,
-            step=0.1,
-            key="lift",
-            bind="query-params",
-            on_change=rule_base.choose,
-            help=word_help("lift", "Here: how much of it a rule must have at least; 0: no limit."),
-        )
+        if chosen_mode() == DEMAND:
+            st.slider(
+                "Minimum lift",
+                0.0,
+                MAX_LIFT,
+                value=0.0,
+                step=0.1,
+                key="lift",
+                bind="query-params",
+                on_change=rule_base.choose,
+                help=word_help(
+                    "lift", "Here: how much of it a rule must have at least; 0: no limit."
+                ),
+            )
         st.slider(
             "Maximum depth",
             0,

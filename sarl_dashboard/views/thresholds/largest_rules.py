@@ -28,6 +28,14 @@ def show_largest(display: Display, thresholds: Thresholds, total: int) -> None:
     if display.compact is not None:
         show_compact(display.compact, display.dimension)
         return
+    if not total and display.forbids:
+        st.info(
+            "No part of the tree is as frequent as the minimum support asks and shows that the "
+            "expert does some action there as rarely as epsilon asks. Lower the minimum support or "
+            "raise epsilon: the maps show where there are rules.",
+            icon=":material/filter_alt_off:",
+        )
+        return
     if not total:
         st.info(
             "No part of the tree is as frequent and as certain as these thresholds ask. Lower "

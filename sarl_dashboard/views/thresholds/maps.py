@@ -5,6 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.explaining.figures import thresholds as figures
+from sarl_core.mining.never.landscape import NeverLandscape
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_dashboard.components.places import placed
@@ -15,14 +16,15 @@ from sarl_dashboard.views.thresholds.moves import take_click
 BARE = {"displayModeBar": False, "scrollZoom": False}
 
 
-def show_maps(display: Display, landscape: Landscape) -> None:
+def show_maps(display: Display, landscape: Landscape | NeverLandscape) -> None:
     """Two maps side by side, with the mark that `controls` moves, or hides.
 
     Args:
         display: What is looked at.
         landscape: On its grid.
     """
-    margin = figures.MARGIN
+    margin, styles = figures.MARGIN, figures.styles_of(landscape)
+    other = "epsilon" if display.forbids else "minimum confidence"
     st.html(
         placed(
             "maps",
@@ -35,7 +37,7 @@ def show_maps(display: Display, landscape: Landscape) -> None:
     with st.container(key="maps"):
         for column, layer in zip(st.columns(2), display.layers, strict=True):
             with column:
-                st.markdown(f"**{figures.STYLES[layer].title}**")
+                st.markdown(f"**{styles[layer].title}**")
                 with st.container(key=f"box_{layer}"):
                     st.plotly_chart(
                         figures.heatmap(landscape, layer, dark=is_dark()),
@@ -43,8 +45,7 @@ def show_maps(display: Display, landscape: Landscape) -> None:
                         config=BARE,
                         selection_mode="points",
                         on_select=lambda key=f"map_{layer}": take_click(key, display.trees),
-                        alt=f"{figures.STYLES[layer].title}, for every minimum support and "
-                        "minimum confidence",
+                        alt=f"{styles[layer].title}, for every minimum support and {other}",
                     )
     st.caption(
         "Click a cell to set both thresholds to it. "
@@ -56,7 +57,9 @@ def show_maps(display: Display, landscape: Landscape) -> None:
     )
 
 
-def show_surfaces(display: Display, landscape: Landscape, thresholds: Thresholds) -> None:
+def show_surfaces(
+    display: Display, landscape: Landscape | NeverLandscape, thresholds: Thresholds
+) -> None:
     """The same two layers as the paper draws them.
 
     Args:
@@ -64,18 +67,19 @@ def show_surfaces(display: Display, landscape: Landscape, thresholds: Thresholds
         landscape: On its grid.
         thresholds: Those in force.
     """
-    marked = display.compact is None
+    marked, styles = display.compact is None, figures.styles_of(landscape)
+    upwards = thresholds.confidence if thresholds.never is None else thresholds.never
     point = display.point(thresholds)
     for column, layer in zip(st.columns(2), display.layers, strict=True):
         with column:
-            st.markdown(f"**{figures.STYLES[layer].title}**")
+            st.markdown(f"**{styles[layer].title}**")
             figure = figures.surface(
                 landscape,
                 layer,
                 dark=is_dark(),
                 chosen=(
                     thresholds.support,
-                    thresholds.confidence,
+                    upwards,
                     float(getattr(point, layer)[0, 0]),
                 )
                 if marked
@@ -85,6 +89,6 @@ def show_surfaces(display: Display, landscape: Landscape, thresholds: Thresholds
                 figure,
                 key=f"surface_{layer}",
                 config={"displaylogo": False},
-                alt=f"{figures.STYLES[layer].title} as a surface",
+                alt=f"{styles[layer].title} as a surface",
             )
     st.caption("Drag to turn." + (" The dot marks the present thresholds." if marked else ""))

@@ -8,7 +8,14 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.steps import neat_point
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.state import rule_base
-from sarl_dashboard.state.thresholds import choose_thresholds, chosen_limits, least_support
+from sarl_dashboard.state.thresholds import (
+    DEMAND,
+    choose_mode,
+    choose_thresholds,
+    chosen_limits,
+    chosen_mode,
+    least_support,
+)
 from sarl_dashboard.views.thresholds.display import SURFACES, TRADE_OFFS
 
 
@@ -51,6 +58,13 @@ def use(setting: Thresholds) -> None:
     st.rerun()  # lift and depth, which it resets, are part of the maps
 
 
+def use_mode(mode: str) -> None:
+    """Put rules at the thresholds in force that demand, or that forbid; for callbacks."""
+    choose_mode(mode)
+    st.session_state.pop("_clicked", None)
+    rule_base.choose()
+
+
 def use_compact(name: str) -> None:
     """Put a compact set in force."""
     rule_base.choose(name)
@@ -73,11 +87,11 @@ def take_click(key: str, trees: tuple[PolicyTree, ...]) -> None:
         data = points[0]["customdata"]
         # Which of the two arrives depends on how the numbers were packed for the browser.
         values = list(data.values()) if isinstance(data, dict) else list(data)
-        clicked = Thresholds(float(values[0]), float(values[1]), *chosen_limits())
+        support, other = float(values[0]), float(values[1])
         if key == "pareto":
-            clicked = neat_point(trees, clicked)
-        support = max(clicked.support, least_support())
-        st.session_state["_clicked"] = (support, clicked.confidence)
-    support, confidence = st.session_state.get("_clicked", (None, None))
-    if support is not None:
-        move(support=support, confidence=confidence)
+            clicked = neat_point(trees, Thresholds(support, other, *chosen_limits()))
+            support, other = clicked.support, clicked.confidence
+        name = "confidence" if chosen_mode() == DEMAND else "epsilon"
+        st.session_state["_clicked"] = {"support": max(support, least_support()), name: other}
+    if clicked_cell := st.session_state.get("_clicked"):
+        move(**clicked_cell)

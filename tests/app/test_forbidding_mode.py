@@ -1,0 +1,102 @@
+"""Rules that forbid at thresholds: the mode on Thresholds, and what follows from it elsewhere."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+
+from sarl_core import RuleSet, grow_policy_trees, load_demonstrations
+from sarl_core.explaining.report.provenance import mined_again, mining_command
+from sarl_core.mining.language import share_text
+from sarl_core.mining.never.never_rules import mine_never_rules
+from sarl_core.shielding.leeway import leeway_of
+from sarl_core.shipped import DATA
+from tests.app.screens import errors, html, metrics, open_page, page_file, texts
+
+LANDER = load_demonstrations(DATA / "demonstrations" / "lunar_lander.parquet")
+FORBID = {"data": "lunar_lander", "mode": "forbid", "epsilon": "0.1", "support": "0.01"}
+
+
+@pytest.fixture(scope="module")
+def rules() -> RuleSet:
+    return mine_never_rules(LANDER, epsilon=0.1, supp_min=0.01)
+
+
+def test_the_numbers_are_those_of_mining(rules: RuleSet) -> None:
+    app = open_page("thresholds", **FORBID)
+    leeway, shown = leeway_of(rules, LANDER), metrics(app)
+    assert shown["Rules"] == f"{len(rules)}"
+    for name in ("coverage", "fidelity", "freedom"):
+        assert shown[name.title()] == share_text(getattr(leeway, name), decimals=1)
+    assert list(app.dataframe[0].value["Rule"]) == [
+        rules.name_of(rule) for rule in sorted(rules, key=lambda rule: -rule.samples)
+    ]
+    assert "Best trade-offs" not in [tab.label for tab in app.tabs]
+
+
+def test_the_mode_is_chosen_and_both_thresholds_stay() -> None:
+    app = open_page("thresholds", data="lunar_lander", confidence="0.9")
+    before = metrics(app)
+    app.button_group(key="_mode_choice").set_value("forbid").run()
+    assert app.query_params["mode"] == "forbid"
+    app.select_slider(key="epsilon").set_value(0.1).run()
+    assert "Freedom" in metrics(app)
+    app.switch_page(page_file("rules")).run()
+    assert not app.exception
+    # A part of the address of every page, as is the confidence that is set aside.
+    for name, value in (("mode", "forbid"), ("epsilon", "0.1"), ("confidence", "0.9")):
+        assert app.query_params[name] == value
+    app.switch_page(page_file("thresholds")).run()
+    app.button_group(key="_mode_choice").set_value("demand").run()
+    assert "mode" not in app.query_params
+    assert metrics(app) == before
+
+
+@pytest.mark.parametrize("view", ["Maps", "3-D"])
+@pytest.mark.parametrize("left", ["Rules and freedom", "Coverage and fidelity"])
+def test_every_way_to_look_at_them_is_drawn(view: str, left: str) -> None:
+    app = open_page("thresholds", view=view, left=left, **FORBID)
+    assert len(app.get("plotly_chart")) == 2
+
+
+def test_no_rule_is_said_to_be_none() -> None:
+    app = open_page("thresholds", **(FORBID | {"epsilon": "0.001", "support": "0.9"}))
+    assert metrics(app)["Rules"] == "0"
+    assert metrics(app)["Freedom"] == "100 %"
+    assert "raise epsilon" in texts(app)
+    rules = open_page("rules", **(FORBID | {"epsilon": "0.001", "support": "0.9"}))
+    assert "nothing is forbidden" in texts(rules)
+
+
+@pytest.mark.parametrize("epsilon", ["0", "1", "-1", "x", "nan"])
+def test_an_epsilon_that_is_none_is_left_out_of_the_link(epsilon: str) -> None:
+    app = open_page("thresholds", **(FORBID | {"epsilon": epsilon}))
+    assert "epsilon" not in app.query_params
+    assert app.select_slider(key="epsilon").value == 0.05
+
+
+def test_the_rules_flow_to_the_other_pages(rules: RuleSet) -> None:
+    app = open_page("rules", **FORBID)
+    assert len(app.dataframe[0].value) == len(rules)
+    assert "From the root to the rule" in html(app)
+    assert "epsilon **0.1**" in texts(app)
+    command = mining_command(rules, "rules.json", "lander.parquet", LANDER)
+    assert command is not None
+    assert command.endswith(" mine lander.parquet --support 0.01 --never 0.1 --out rules.json")
+    trees = grow_policy_trees(LANDER)
+    assert mined_again(rules, trees)
+    assert not mined_again(replace(rules, rules=rules[1:]), trees)
+    assert "Editing understands rules that demand" in texts(open_page("edit", **FORBID))
+    assert "rules that demand an action" in texts(open_page("evidence", **FORBID))
+    for page in ("what_if", "episodes", "overview", "names", "export"):
+        assert not errors(open_page(page, **FORBID))
+
+
+def test_continuous_actions_are_forbidden_by_intervals() -> None:
+    app = open_page("thresholds", data="bipedal_walker", mode="forbid", divider="4")
+    assert int(metrics(app)["Rules"].replace(",", "")) > 0
+    chosen = open_page("what_if", data="bipedal_walker", mode="forbid", divider="4")
+    found = re.findall(r"Forbidden here: .*? Freedom (\d+) %", html(chosen))
+    assert all(0 <= int(one) <= 100 for one in found)
