@@ -9,6 +9,7 @@ import json
 import struct
 import subprocess
 import sys
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -394,6 +395,22 @@ def test_pages_of_every_kind_are_counted() -> None:
             found = largest_chunk(memoryview(out.getvalue()), 5000, [0, 1, 2])
             # The footer counts the pages' headers too.
             assert 0.8 * said < found <= said
+
+
+def test_features_of_a_parquet_file_are_in_memory_once() -> None:
+    steps, features = 100_000, 48
+    states = np.random.default_rng(0).normal(size=(features, steps)).astype(np.float32)
+    columns = {f"obs_{index}": values for index, values in enumerate(states)}
+    content = zstd(**columns, action=labels(steps))
+    read_demonstrations(parquet_bytes(), "demo.parquet")  # what is imported is not counted
+    tracemalloc.start()
+    try:
+        read = read_demonstrations(content, "demo.parquet")
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert (read.observations == states.T).all()
+    assert most < 1.8 * states.nbytes
 
 
 def test_the_columns_that_are_not_used_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:

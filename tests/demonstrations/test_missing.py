@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pytest
+from pyarrow import feather
 
 from sarl_core import Demonstrations
 from sarl_core.demonstrations.formats import read_demonstrations
@@ -66,6 +69,17 @@ def test_not_a_number_is_missing_in_every_format(kind: str) -> None:
         read_demonstrations(content, name)
     left = read_demonstrations(content, name, missing="drop").observations[:, 0].tolist()
     assert left == ([0, 3] if kind == "parquet" else [0, 2, 3])
+
+
+def test_a_whole_number_that_is_missing_is_no_zero() -> None:
+    table = pa.table({"obs_x": [1, None, 2, 3], "obs_y": [0.5] * 4, "action": [0, 1, 0, 1]})
+    arrow = io.BytesIO()
+    feather.write_feather(table, arrow)
+    for content, name in ((parquet_bytes(table), "log.parquet"), (arrow.getvalue(), "log.feather")):
+        with pytest.raises(InputError, match=r"'obs_x' is empty .* in 1 of 4 rows.*row 2"):
+            read_demonstrations(content, name)
+        left = read_demonstrations(content, name, missing="drop")
+        assert left.observations[:, 0].tolist() == [1, 2, 3]
 
 
 def test_what_would_leave_nothing_is_refused() -> None:

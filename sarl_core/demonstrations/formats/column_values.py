@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -285,14 +286,19 @@ def _followers(
     """For each feature the other one whose next value it holds in every row."""
     if np.count_nonzero(together) < _LEAST_ROWS:
         return {}
-    later = {values[name][1:][together].tobytes(): name for name in features}
+    later = {_fingerprint(values[name][1:][together]): name for name in features}
     followed = {}
     for name in features:
         held = values[name][:-1][together]
-        base = later.get(held.tobytes())
+        base = later.get(_fingerprint(held))
         if base is not None and base != name and np.count_nonzero(np.diff(held)) >= _LEAST_CHANGES:
             followed[name] = base
     return followed
+
+
+def _fingerprint(values: NDArray[Any]) -> bytes:
+    # The values themselves, of all features, would be in memory once more.
+    return hashlib.blake2b(values.tobytes()).digest()
 
 
 def _rises_since_1970(values: NDArray[Any]) -> bool:

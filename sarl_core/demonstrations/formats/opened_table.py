@@ -84,7 +84,25 @@ def as_float32(column: TableColumn) -> TableColumn:
     if column.words or column.values.dtype.kind == "b":
         return column
     with np.errstate(over="ignore", invalid="ignore"):  # found as infinite
-        return TableColumn(column.values.astype(np.float32, copy=False), column.missing)
+        return TableColumn(column.with_gaps.astype(np.float32, copy=False), column.missing)
+
+
+def side_by_side(columns: Sequence[NDArray[Any]]) -> NDArray[np.float32] | None:
+    """The block that columns were read into.
+
+    Args:
+        columns: d arrays of shape (N,).
+
+    Returns:
+        Shape (N, d), float32, with all of its columns in this order; None where they stand
+        elsewhere, or in another order.
+    """
+    block = columns[0].base
+    if block is None or block.dtype != np.float32 or block.shape != (len(columns[0]), len(columns)):
+        return None
+    places = [(one.ctypes.data, one.strides) for one in columns]
+    of_block = [(one.ctypes.data, one.strides) for one in block.T]
+    return block if places == of_block else None
 
 
 def check_names(names: Sequence[str]) -> None:

@@ -30,6 +30,7 @@ from sarl_core.demonstrations.formats.columns import (
 from sarl_core.demonstrations.formats.mapping.roles import settled_by
 from sarl_core.demonstrations.formats.metadata import Metadata
 from sarl_core.demonstrations.formats.naming import naming
+from sarl_core.demonstrations.formats.observation_blocks import observation_block
 from sarl_core.demonstrations.formats.opened_table import Table, TableColumn
 from sarl_core.demonstrations.formats.recording import Recording
 from sarl_core.demonstrations.formats.tables import (
@@ -42,7 +43,6 @@ from sarl_core.demonstrations.formats.tables import (
     missing_block,
     names_of_features,
     numbers_of,
-    observation_block,
     require_filled,
     require_numbers,
     units_of,

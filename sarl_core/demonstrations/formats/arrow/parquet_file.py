@@ -98,10 +98,13 @@ class ParquetTable(TableOfLeaves):
                 if leaf.path and is_text(leaf_type(leaf, schema.field(leaf.column).type))
             ]
             file = _opened(self.data, texts)
+            # The features side by side, as they are needed in the end: columns would be copied.
+            block = np.empty((rows, d), dtype=np.float32)
+            places = dict(zip(columns.observations, block.T, strict=True))
             read: dict[str, TableColumn] = {}
             for column in used:
                 wanted = {name: leaf for name, leaf in leaves.items() if leaf.column == column}
-                read |= _columns(file, column, wanted, columns, schema)
+                read |= _columns(file, column, wanted, columns, schema, places)
             return {name: read[name] for name in columns.used}
 
 
@@ -184,8 +187,9 @@ def _columns(
     leaves: Mapping[str, Leaf],
     used: ColumnMap,
     schema: Any,
+    places: Mapping[str, NDArray[np.float32]],
 ) -> dict[str, TableColumn]:
-    """The leaves of one column, brought into their final form batch by batch."""
+    """The leaves of one column, brought into their final form and place batch by batch."""
     import pyarrow as pa
 
     rows = file.metadata.num_rows
@@ -205,11 +209,11 @@ def _columns(
             part = column_from_arrow(name, held, at)
             if name not in values:
                 # True and false are more than 1 and 0.
-                as_it_is = name not in used.observations or part.values.dtype.kind == "b"
-                values[name] = np.empty(rows, dtype=part.values.dtype if as_it_is else np.float32)
+                as_it_is = name not in places or part.values.dtype.kind == "b"
+                values[name] = np.empty(rows, part.values.dtype) if as_it_is else places[name]
             # What overflows float32 is found as infinite.
             with np.errstate(over="ignore", invalid="ignore"):
-                values[name][at:end] = part.values
+                values[name][at:end] = part.with_gaps if name in places else part.values
             if part.missing is not None:
                 missing.setdefault(name, np.zeros(rows, dtype=np.bool_))[at:end] = part.missing
         at = end
