@@ -19,9 +19,9 @@ from tests.paper.test_shields import cart, lander
 CLAIM = ENTRY.claims[0]
 
 
-def chances(name: str, **frames: pd.DataFrame) -> list[float | None]:
+def chances(name: str, deals: int, **frames: pd.DataFrame) -> list[float | None]:
     tables = {key.removeprefix("figure_"): frame for key, frame in frames.items()}
-    return [claim.by_chance for claim in with_chance(STUDIES[name], tables, deals=240)]
+    return [claim.by_chance for claim in with_chance(STUDIES[name], tables, deals=deals)]
 
 
 def test_an_order_of_four_agrees_once_in_twenty_four() -> None:
@@ -31,12 +31,12 @@ def test_an_order_of_four_agrees_once_in_twenty_four() -> None:
         unfiltered=np.linspace(140, 160, 40),
         expert=np.linspace(260, 280, 40),
     )
-    order, *_ = chances("6", figure_6=apart)
+    order, *_ = chances("6", 240, figure_6=apart)
     assert order == pytest.approx(1 / 24, abs=0.03)
 
 
 def test_what_asks_for_little_agrees_often_and_the_same_every_time() -> None:
-    first, second = chances("5", figure_5=cart()), chances("5", figure_5=cart())
+    first, second = (chances("5", 60, figure_5=cart()) for _ in range(2))
     assert first == second
     # Two arms of four have dips.
     assert first[3] is not None

@@ -75,7 +75,7 @@ def test_what_is_not_known_counts_against_both_verdicts():
 
 @settings(deadline=None, max_examples=60)
 @given(
-    st.floats(0.002, 0.6),
+    st.floats(0.005, 0.6),
     st.floats(0.5, 0.995),
     st.one_of(st.none(), st.floats(1.0, 30.0)),
 )
@@ -83,7 +83,7 @@ def test_neither_verdict_is_wrong_more_often_than_it_says(at_most, certainty, ti
     usual = sequential_test(at_most, certainty)
     test = usual
     if times is not None:
-        episodes = min(int(times * usual.certified[0]) + 1, 20_000)
+        episodes = min(int(times * usual.certified[0]) + 1, 8_000)
         if episodes >= usual.certified[0]:
             test = sequential_test(at_most, certainty, episodes)
     error = (1.0 - certainty) * (1.0 + 1e-9)
