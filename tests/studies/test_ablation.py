@@ -76,6 +76,12 @@ def behind_demands() -> RuleSet:
     return with_never_rules(demanding, trees, 0.2)
 
 
+@pytest.fixture(scope="module")
+def at_once() -> Ablation:
+    """What nobody called off, and no process that died, would have given."""
+    return ablate("CartPole-v1", "novice", Shield(mined()), episodes=5, seed=9)
+
+
 def by_brute_force(env_id: str, shield: Shield, rule: int, episodes: int, seed: int) -> object:
     rules = tuple(one for index, one in enumerate(shield.rule_set.rules) if index != rule)
     others = Shield(replace(shield.rule_set, rules=rules), projection=shield.projection)
@@ -183,7 +189,9 @@ class DeadlyOnce:
         return self.inner.act(observations, uniforms)
 
 
-def test_when_a_process_dies_it_is_said_and_asked_again_the_work_goes_on(tmp_path: Path) -> None:
+def test_when_a_process_dies_it_is_said_and_asked_again_the_work_goes_on(
+    tmp_path: Path, at_once: Ablation
+) -> None:
     shield, novice = Shield(mined()), make_agent("novice", "CartPole-v1")
     file = tmp_path / "deadly"
     agent = DeadlyOnce(novice, file, n_uniforms=novice.n_uniforms)
@@ -202,12 +210,10 @@ def test_when_a_process_dies_it_is_said_and_asked_again_the_work_goes_on(tmp_pat
         list(record.run(5, 200, runner))
     found = record.result(5, 200)
     assert found is not None
-    assert found.to_frame().equals(
-        ablate("CartPole-v1", "novice", shield, episodes=5, seed=9).to_frame()
-    )
+    assert found.to_frame().equals(at_once.to_frame())
 
 
-def test_called_off_what_is_finished_stays() -> None:
+def test_called_off_what_is_finished_stays(at_once: Ablation) -> None:
     shield = Shield(mined())
     record = AblationRecord("CartPole-v1", make_agent("novice", "CartPole-v1"), shield, 9)
     assert record.result(5, 200) is None
@@ -222,21 +228,17 @@ def test_called_off_what_is_finished_stays() -> None:
     list(record.run(5, 200, run_tasks))
     whole = record.result(5, 200)
     assert whole is not None
-    assert whole.to_frame().equals(
-        ablate("CartPole-v1", "novice", shield, episodes=5, seed=9).to_frame()
-    )
+    assert whole.to_frame().equals(at_once.to_frame())
 
 
-def test_two_callers_at_the_same_ablation_get_what_one_would() -> None:
+def test_two_callers_at_the_same_ablation_get_what_one_would(at_once: Ablation) -> None:
     shield = Shield(mined())
     record = AblationRecord("CartPole-v1", make_agent("novice", "CartPole-v1"), shield, 9)
     for both in zip_longest(record.run(5, 200, run_tasks), record.run(5, 200, run_tasks)):
         assert all(step is None or step.done <= step.total for step in both)
     found = record.result(5, 200)
     assert found is not None
-    assert found.to_frame().equals(
-        ablate("CartPole-v1", "novice", shield, episodes=5, seed=9).to_frame()
-    )
+    assert found.to_frame().equals(at_once.to_frame())
 
 
 def made(returns: list[list[float]], failed: list[list[bool]], env_id: str) -> Ablation:
