@@ -99,6 +99,19 @@ def test_conditions_and_what_the_rules_are_worth_are_said(study: LearningStudy) 
     assert "Mind" not in alone
 
 
+def test_rules_that_only_forbid_do_not_act_for_the_learner(study: LearningStudy) -> None:
+    forbidding = replace(
+        study,
+        runs=tuple(
+            replace(run, shielded=replace(run.shielded, freedom=0.3))
+            for run in study.runs
+            if run.shielded is not None
+        ),
+    )
+    paragraphs = finding(forbidding, summarise_study(forbidding))
+    assert not any("speak in nearly every state" in text for text in paragraphs)
+
+
 def test_a_learner_that_is_as_safe_without_a_shield_is_not_passed_over() -> None:
     study = a_study(
         a_run("none", 0, 10, -190.0), a_run("handover", 0, 3, 210.0), a_run("none-replay", 0, 3, 0)

@@ -287,7 +287,9 @@ def _rules(study: LearningStudy, summaries: Sequence[ArmSummary]) -> str:
     covered = [
         summary.shielded
         for summary in summaries
-        if summary.shielded is not None and summary.shielded.coverage >= _NEARLY_ALL
+        if summary.shielded is not None
+        and summary.shielded.coverage >= _NEARLY_ALL
+        and (summary.shielded.freedom or 0.0) <= 1.0 - _NEARLY_ALL  # else they only forbid
     ]
     # Where an interval leaves the learner room, it matters what was learned.
     if not covered or np.ptp([trials.mean for trials in covered]) > _SAME:
