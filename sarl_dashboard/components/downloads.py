@@ -25,6 +25,7 @@ MIMES = {
     ".mp4": "video/mp4",
     ".npz": "application/octet-stream",
     ".onnx": "application/octet-stream",
+    ".pdf": "application/pdf",
     ".parquet": "application/vnd.apache.parquet",
     ".png": "image/png",
     ".py": "text/x-python",

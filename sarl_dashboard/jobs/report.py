@@ -50,7 +50,7 @@ class ReportOrder:
         wishes = self.wishes
         names = (wishes.rules_name, wishes.demonstrations_name)
         sign_off = sign_off_text(wishes.sign_off)
-        contents = (wishes.in_full, wishes.frames, wishes.commands, names, sign_off)
+        contents = (wishes.in_full, wishes.frames, wishes.commands, names, sign_off, wishes.cover)
         return key_of((self.rule_set, self.demonstrations, contents, self.comparison))
 
 

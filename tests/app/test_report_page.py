@@ -42,7 +42,8 @@ def test_the_report_is_the_one_of_the_command_that_stands_in_it(tmp_path, monkey
     assert not app.get("iframe")
     html = shown(made(app))
     assert app.button(key="run_report").disabled
-    assert [button.label for button in app.get("download_button")] == ["Download the report"]
+    labels = [button.label for button in app.get("download_button")]
+    assert labels[:2] == ["Download the report", "Download the slides"]
     monkeypatch.chdir(tmp_path)
     (tmp_path / "data").symlink_to(DATA)
     cart = "data/demonstrations/cartpole.parquet"
@@ -63,6 +64,18 @@ def test_the_report_is_the_one_of_the_command_that_stands_in_it(tmp_path, monkey
         == 0
     )
     assert (tmp_path / "report.html").read_text(encoding="utf-8") == html
+
+
+def test_what_is_typed_stands_on_the_first_page_and_in_the_command() -> None:
+    about = {"report_title": "Poles", "report_sign_off": "Ada\nGrace", "report_notes": "<b>!"}
+    app = open_page("report", data="cartpole", frames="0", in_full="1", **about)
+    assert app.text_input(key="report_title").value == "Poles"
+    html = shown(made(app))
+    page = html.split("</header>")[0]
+    assert "<h1>Poles</h1>" in page
+    assert all(f'<th scope="row">{name}</th>' in page for name in ("Ada", "Grace"))
+    assert "&lt;b&gt;!" in page
+    assert "--title Poles" in html
 
 
 def test_rules_for_other_features_are_refused_in_place() -> None:

@@ -22,7 +22,7 @@ def test_a_report_is_made_and_opens_without_the_dashboard(
     expect(inside.get_by_role("heading", name="Rules for Cart Pole", level=1)).to_be_visible()
     assert parameters(screen)["frames"] == "1"
     with screen.expect_download() as started:
-        screen.get_by_test_id("stDownloadButton").click()
+        screen.get_by_role("button", name="Download the report").click()
     path = tmp_path / "report.html"
     started.value.save_as(path)
     no_trace(screen)

@@ -36,6 +36,16 @@ def document_to_pdf(html: str) -> bytes:
         raise without_browser(error, _WHAT, _ADVICE) from error
 
 
+def can_print() -> bool:
+    """Whether there is a browser of this machine to print with."""
+    try:
+        from choreographer.browsers.chromium import Chromium
+    except ImportError:
+        return False
+    browser = Chromium.find_browser(skip_local=False)
+    return browser is not None and Path(browser).is_file()
+
+
 def _printed(browser: str, html: str) -> bytes:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         page, printed = Path(folder, "report.html"), Path(folder, "report.pdf")

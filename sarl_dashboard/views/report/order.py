@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.explaining.report.comparison import Result, results_from_text
+from sarl_core.explaining.report.cover import Cover, logo_of
 from sarl_core.explaining.report.provenance import command_line, mining_command
 from sarl_core.explaining.report.report import Wishes
 from sarl_core.explaining.report.tally import report_rules
@@ -32,7 +33,7 @@ from sarl_dashboard.state.rule_files import (
     fitting_demonstrations,
 )
 from sarl_dashboard.state.sign_off import sign_off_here
-from sarl_dashboard.views.report.settings import ReportChoices
+from sarl_dashboard.views.report.settings import CoverChoices, ReportChoices
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,7 @@ def order_of(choices: ReportChoices, demonstrations: Demonstrations) -> ReportOr
         rules_name=named.rules.rsplit("/", 1)[-1],
         demonstrations_name=named.demonstrations.rsplit("/", 1)[-1],
         sign_off=sign_off_here(rule_set),
+        cover=cover_of(choices.cover),
     )
     trees = None
     if rule_set.cut == "thresholds":
@@ -78,6 +80,23 @@ def order_of(choices: ReportChoices, demonstrations: Demonstrations) -> ReportOr
     # The card of the shipped compact rules says how they came about.
     card = read_card(compact_file(choices.rules)) if choices.rules in COMPACT_ENDINGS else None
     return ReportOrder(rule_set, demonstrations, wishes, card, results, trees)
+
+
+def cover_of(choices: CoverChoices) -> Cover:
+    """What is to stand on the first page.
+
+    Raises:
+        InputError: If something does not fit there, or the logo is no picture.
+    """
+    logo = choices.logo
+    return Cover(
+        title=choices.title,
+        author=choices.author,
+        date=choices.date,
+        notes=choices.notes,
+        signers=choices.signers,
+        logo=None if logo is None else logo_of(logo.getvalue(), logo.name),
+    )
 
 
 def results_of_choices(
@@ -135,6 +154,12 @@ def commands(
         {
             "--demonstrations": named.demonstrations,
             "--comparison": list(named.results),
+            "--title": choices.cover.title or None,
+            "--author": choices.cover.author or None,
+            "--date": choices.cover.date or None,
+            "--logo": None if choices.cover.logo is None else choices.cover.logo.name,
+            "--notes": choices.cover.notes or None,
+            "--sign-off": list(choices.cover.signers),
             "--in-full": None if choices.in_full == Wishes.in_full else choices.in_full,
             **({} if offered is None else offered.options),
             "--frames": None if choices.frames == Wishes.frames else choices.frames,

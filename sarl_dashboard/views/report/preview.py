@@ -6,6 +6,7 @@ import base64
 
 import streamlit as st
 
+from sarl_core.explaining.report.pdf import can_print
 from sarl_core.explaining.report.report import Report
 from sarl_core.explaining.words.sign_off import sign_off_text
 from sarl_core.mining.language import counted
@@ -64,11 +65,14 @@ def show(report: Report, name: str) -> None:
         st.info(f"The report has no pictures: {escaped(report.without)}.", icon=":material/info:")
     with st.container(horizontal=True, vertical_alignment="center"):
         download("Download the report", content, f"report-{name}.html", key="report_file")
+        download("Download the slides", lambda: report.slides, f"slides-{name}.html", key="slides")
+        if can_print():
+            download("Download as PDF", lambda: report.pdf, f"report-{name}.pdf", key="report_pdf")
         keep_result_button(content, f"report-{name}.html", key="keep_report")
         st.caption(
             f"One HTML file of {len(content) / 1e6:.1f} MB with "
             f"{counted(report.pictures, 'picture')}. It opens without a network, in any browser, "
-            "and prints on A4.",
+            "and prints on A4; the slides hold one rule each.",
             width="content",
         )
     # As an address of its own the file has no access to this page, whatever names are in it.

@@ -7,8 +7,21 @@ from dataclasses import dataclass
 import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
+from sarl_core.explaining.report.cover import MOST_LINE, MOST_NOTES, MOST_TITLE
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import rule_set_choice
+
+
+@dataclass(frozen=True, eq=False)
+class CoverChoices:
+    """What is to stand on the first page, as it was typed."""
+
+    title: str
+    author: str
+    date: str
+    notes: str
+    signers: tuple[str, ...]
+    logo: UploadedFile | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +33,7 @@ class ReportChoices:
     frames: int
     with_session: bool
     files: list[UploadedFile]
+    cover: CoverChoices
 
 
 def settings(has_comparison: bool) -> ReportChoices:
@@ -69,4 +83,38 @@ def settings(has_comparison: bool) -> ReportChoices:
                 accept_multiple_files=True,
                 key="report_results",
             )
-    return ReportChoices(rules, int(in_full or 0), int(frames or 0), with_session, files)
+        cover = _cover_choices()
+    return ReportChoices(rules, int(in_full or 0), int(frames or 0), with_session, files, cover)
+
+
+def _cover_choices() -> CoverChoices:
+    with st.expander("Title, author, logo, notes and who signs"):
+        with st.grid(3, min_column_width=150, gap="small"):
+            title = _line("Title", "report_title", MOST_TITLE, "the name of the task")
+            author = _line("Author", "report_author", MOST_LINE, "")
+            date = _line("Date", "report_date", MOST_LINE, "as it is to stand there")
+        with st.grid(2, min_column_width=200, gap="small"):
+            notes = st.text_area(
+                "Notes",
+                key="report_notes",
+                bind="query-params",
+                max_chars=MOST_NOTES,
+                placeholder="what you say, on the first page",
+            )
+            signers = st.text_area(
+                "Who is to sign, one a line",
+                key="report_sign_off",
+                bind="query-params",
+                placeholder="as Head of operations",
+            )
+        # Which file is no picture is said by who reads it, and not by its name.
+        logo = st.file_uploader("Logo (PNG or JPEG)", key="report_logo")
+    lines = tuple(line.strip() for line in (signers or "").splitlines() if line.strip())
+    return CoverChoices(title, author, date, notes or "", lines, logo)
+
+
+def _line(label: str, key: str, most: int, placeholder: str) -> str:
+    text = st.text_input(
+        label, key=key, bind="query-params", max_chars=most, placeholder=placeholder
+    )
+    return (text or "").strip()
