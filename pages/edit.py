@@ -15,7 +15,7 @@ from sarl_dashboard.views.edit.editing import editing
 st.title("Edit")
 st.caption(
     "Switch rules off, pin them, move them, add your own, or let a part of the tree grow anew from "
-    "another query: edits stay while the thresholds move, and are in force on every page."
+    "another condition: edits stay while the thresholds move, and are in force on every page."
 )
 base = edited_base()
 if forbidding_notice("Editing"):

@@ -49,7 +49,7 @@ IN_FULL = {
     "lunar_lander_few_combined": "The rules of Lunar Lander with the fewest:",
 }
 HEAD = (
-    *("task", "rules", "features a query", "mean return, 95 % interval", "200 or more"),
+    *("task", "rules", "features a condition", "mean return, 95 % interval", "200 or more"),
     "failures, 95 % interval",
 )
 SEEDS_HEAD = "each of five learning seeds, rules: mean (failures)"

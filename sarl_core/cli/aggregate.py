@@ -105,7 +105,7 @@ def aggregate(
         int,
         typer.Option(
             "--refine",
-            help="Turns of changing queries and labels, and moving thresholds, to where they "
+            help="Turns of changing conditions and labels, and moving thresholds, to where they "
             "achieve more; 0 for none.",
         ),
     ] = 0,

@@ -58,9 +58,9 @@ def test_the_table_says_what_each_query_would_do_and_one_is_taken_and_undone() -
     # The smallest part that the rule is of; as it is now stands first, the best others follow.
     offered = next_queries(TREES[0], NODE, CARTPOLE)
     assert len(table) == len(offered) == len(FEATURES)
-    assert table["Query"][0].endswith(" (now)")
+    assert table["Condition"][0].endswith(" (now)")
     assert table["Gain"].tolist() == [query.gain for query in offered]
-    assert [text.startswith(FEATURES[QUERY.feature]) for text in table["Query"]][1]
+    assert [text.startswith(FEATURES[QUERY.feature]) for text in table["Condition"]][1]
     for row, trees, rules in ((0, TREES, MINED), (1, NEW, AFTER)):
         assert table["Rules below"][row] == rules_below(trees)
         assert table["Rules"][row] == len(rules)
@@ -82,8 +82,8 @@ def test_the_table_says_what_each_query_would_do_and_one_is_taken_and_undone() -
     assert sorted(shown["Decides"]) == sorted(rule.samples for rule in AFTER.rules)
     # The rule that was chosen is gone: one of the part takes its place, at the same node.
     assert app.session_state["_rule"] in {rule.id for rule in AFTER.rules if rule.regrown}
-    assert queries(app)["Query"][0].startswith(FEATURES[QUERY.feature])
-    assert queries(app)["Query"][0].endswith(" (now)")
+    assert queries(app)["Condition"][0].startswith(FEATURES[QUERY.feature])
+    assert queries(app)["Condition"][0].endswith(" (now)")
     assert "take_query" not in keys(app)
     labels = [button.label.replace("\\", "") for button in app.button]
     (undo,) = [label for label in labels if label.startswith("Undo")]
@@ -200,7 +200,7 @@ def test_rules_without_a_tree_say_so() -> None:
 def test_intervals_of_several_dimensions_are_regrown() -> None:
     app = open_page("edit", data="lunar_lander_continuous")
     table = queries(app)
-    assert table["Query"][0].endswith(" (now)")
+    assert table["Condition"][0].endswith(" (now)")
     (box,) = [one for one in app.selectbox if str(one.key).startswith("regrow_node_")]
     box.set_value(0).run()
     assert len(queries(app)) > 1
@@ -211,7 +211,7 @@ def test_of_many_states_a_query_is_tried_once_it_is_chosen(monkeypatch: pytest.M
     monkeypatch.setattr("sarl_dashboard.views.edit.part.MOST_GROWN", 10)
     app = open_page("edit", data="cartpole", rule=LARGEST.id)
     assert queries(app)["Rules"].notna().tolist() == [True, False, False, False]
-    assert "what a query does is seen once it is chosen" in texts(app)
+    assert "what a condition does is seen once it is chosen" in texts(app)
     app = opened()
     assert queries(app)["Rules"].notna().tolist() == [True, True, False, False]
     click(app, "take_query")

@@ -100,7 +100,7 @@ def test_the_shipped_rules_show_how_they_came_about(shipped: Path, expected: Agg
     assert table["Chosen"].tolist() == [one.number == expected.chosen for one in expected.rounds]
     rounds, by_number = specs(app)
     assert rounds["layout"]["yaxis4"]
-    assert by_number["data"][0]["name"].startswith("one feature a query")
+    assert by_number["data"][0]["name"].startswith("one feature a condition")
     assert "No results are shipped" not in texts(app)
 
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
+import hashlib
 import io
+import re
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
-from sarl_core import Demonstrations, InputError, load_demonstrations, mine_rules
+from sarl_core import Demonstrations, InputError, WorkError, load_demonstrations, mine_rules
 from sarl_core.explaining.report.comparison import read_results
 from sarl_core.explaining.report.cover import Cover, logo_of, read_logo
 from sarl_core.explaining.report.report import Report, make_report
@@ -125,3 +128,37 @@ def test_a_logo_is_drawn_anew_and_small() -> None:
     logo = logo_of(picture("PNG") + hidden, "logo.png")
     assert logo == logo_of(picture("PNG"), "logo.png")
     assert logo.height <= 160
+
+
+def test_slides_hold_one_rule_each_and_run_no_script_but_their_own(
+    cart: Demonstrations, tmp_path: Path
+) -> None:
+    report = reported(cart, cover=Cover(title=HOSTILE), in_full=3)
+    path = tmp_path / "slides.html"
+    report.save_slides(path)
+    html = path.read_text(encoding="utf-8")
+    assert html.count('<section class="slide"') == html.count("<article") + 2 == 5
+    (code,) = re.findall(r"<script>(.*?)</script>", html, flags=re.S)
+    digest = base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in html
+    with pytest.raises(InputError, match=r"end in \.html"):
+        report.save_slides(tmp_path / "slides.pdf")
+
+
+def test_a_report_is_printed(cart: Demonstrations, tmp_path: Path) -> None:
+    path = tmp_path / "report.pdf"
+    signers = ("Ada", "Grace", "Mary", "Emmy")
+    cover = Cover(title="x" * 120, author="Ada", notes="word " * 120, signers=signers)
+    reported(cart, comparison=read_results(CSV), cover=cover).save(path)
+    assert path.read_bytes().startswith(b"%PDF")
+
+
+def test_without_a_browser_a_pdf_is_refused_and_nothing_is_written(
+    cart: Demonstrations, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BROWSER_PATH", "/nowhere/chromium")
+    report = reported(cart)
+    with pytest.raises(WorkError, match="the PDF could not be printed") as caught:
+        report.save(tmp_path / "report.pdf")
+    assert "write .html" in str(caught.value)
+    assert list(tmp_path.iterdir()) == []

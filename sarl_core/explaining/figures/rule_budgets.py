@@ -19,7 +19,7 @@ from sarl_core.explaining.ticks import share_ticks
 from sarl_core.mining.language import share_text
 
 _COLOURS = {False: LABEL_COLOURS[0], True: LABEL_COLOURS[2]}
-_NAMES = {False: "one feature a query", True: "two features a query"}
+_NAMES = {False: "one feature a condition", True: "two features a condition"}
 _RETURN_HEIGHT, _BOTH_HEIGHT = 300, 430
 _CERTAIN = 1.96  # standard errors of a 95 % interval
 

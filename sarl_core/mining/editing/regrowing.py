@@ -120,7 +120,9 @@ def regrown(
     if not 0 <= feature < d:
         raise InputError(f"there is no feature {feature} to ask about; give one of 0 to {d - 1}")
     if not math.isfinite(threshold):
-        raise InputError(f"the threshold of the query is {quoted(threshold)}; give a finite number")
+        raise InputError(
+            f"the threshold of the condition is {quoted(threshold)}; give a finite number"
+        )
     below = _below(tree, place)
     same = (int(tree.feature[place]), float(tree.threshold[place])) == (feature, threshold)
     if same and (tree.number[below] < FIRST_REGROWN).all():

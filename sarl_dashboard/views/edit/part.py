@@ -82,7 +82,7 @@ class QueryOutcome:
     whole: Landscape
 
 
-_next_queries = cached(show_spinner="Looking for the next best queries …")(next_queries)
+_next_queries = cached(show_spinner="Looking for the next best conditions …")(next_queries)
 
 
 def part(of: Base, rule: Rule, now: Verdicts) -> None:
@@ -186,7 +186,7 @@ def _queries(chosen: TreePart) -> None:
     assert demonstrations is not None
     queries = _next_queries(chosen.tree, chosen.number, demonstrations)
     if all(query.current for query in queries):
-        st.caption("No other query parts the states of this node.")
+        st.caption("No other condition parts the states of this node.")
         return
     texts = [chosen.edit(query).text for query in queries]
     link = st.query_params.get("regrow", "")
@@ -220,13 +220,17 @@ def _queries(chosen: TreePart) -> None:
         on_select=pick,
         selection_mode="single-row",
         selection_default={"selection": {"rows": [] if row is None else [row]}},
-        alt="The next best queries at the node, with what each would do",
+        alt="The next best conditions at the node, with what each would do",
     )
     st.caption(
         "Of each feature the threshold that parts the expert's actions best; the first row is as "
         "it is now. The numbers are of the rules mined at the thresholds, without other edits. "
-        + ("" if every else "There are many states: what a query does is seen once it is chosen. ")
-        + "Click the box at the left of a row to choose its query."
+        + (
+            ""
+            if every
+            else "There are many states: what a condition does is seen once it is chosen. "
+        )
+        + "Click the box at the left of a row to choose its condition."
     )
     if row is not None and not queries[row].current:
         outcome = outcomes[row]
@@ -245,7 +249,7 @@ def _misfit(link: str, chosen: TreePart) -> str:
         return "the link is to a node that is not there; choose one on the way to the rule"
     if (edit.dimension, place) != (chosen.dimension, chosen.place):
         return ""
-    return "the query of the link is none of those offered here; choose one of the table"
+    return "the condition of the link is none of those offered here; choose one of the table"
 
 
 @cached()
@@ -297,7 +301,7 @@ def _rows(
         return values
 
     columns: dict[str, Any] = {
-        "Query": [
+        "Condition": [
             f"{name} (now)" if query.current else name
             for name, query in zip(names, queries, strict=True)
         ],
@@ -316,7 +320,7 @@ def _rows(
 def _columns() -> dict[str, Any]:
     column = st.column_config
     return {
-        "Query": column.TextColumn(
+        "Condition": column.TextColumn(
             width=270, help="Where it holds, a state goes one way from the node, else the other"
         ),
         "Gain": column.NumberColumn(
@@ -364,7 +368,7 @@ def _offer(chosen: TreePart, name: str, edit: Regrow, outcome: QueryOutcome) -> 
         )
     )
     st.button(
-        "Take this query",
+        "Take this condition",
         on_click=_take,
         args=(chosen.base, edit),
         type="primary",

@@ -189,7 +189,7 @@ def _further(demonstrations: Demonstrations, rounds: int, *, has_expert: bool) -
                 0,
                 MOST,
                 0,
-                "Afterwards the rules' queries, numbers and actions are changed to where they "
+                "Afterwards the rules' conditions, numbers and actions are changed to where they "
                 f"achieve more, so many times. Each turn takes up to {one - none:,} episodes, and "
                 f"before the first one some of the rounds are moved, which takes {none:,}. 0: not "
                 "at all.",
