@@ -12,7 +12,7 @@ from sarl_core.limits import limited_bytes
 
 MOST_TITLE = 120
 MOST_LINE = 120
-MOST_NOTES = 600
+MOST_NOTES = 400
 MOST_SIGNERS = 4
 _MOST_BYTES = 4 * 2**20
 _MOST_PIXELS = 16_000_000

@@ -20,7 +20,7 @@ from sarl_core.mining.language import at_least_text, counted, number_text, share
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rollouts.seeds import FRESH
 
-MOST_PAIRS = 3  # as many fit on the first page; all stand in the comparison itself
+MOST_PAIRS = 2  # as many fit on the first page; all stand in the comparison itself
 
 
 @dataclass(frozen=True)
