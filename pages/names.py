@@ -42,19 +42,19 @@ if problem:
     )
 left, right = st.columns([5, 3], gap="medium")
 with left:
-    st.subheader(FEATURES)
+    st.header(FEATURES)
     editor(FEATURES, raw)
 with right:
-    st.subheader(ACTIONS)
+    st.header(ACTIONS)
     editor(ACTIONS, raw)
     if raw.is_discrete:
-        st.subheader(LABELS)
+        st.header(LABELS)
         editor(LABELS, raw)
     else:
         st.caption("The labels are intervals of these actions, named by their bounds.")
 named = all_demonstrations()
 assert named is not None
-st.subheader("Formulas")
+st.header("Formulas")
 st.caption(
     "A formula makes one feature of several: a distance over a speed is the time that is left, a "
     "difference of speeds is how fast a gap closes. Rules are then mined with it, on every page."

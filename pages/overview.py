@@ -20,5 +20,5 @@ with left:
 with right:
     show_doors()
 show_stages()
-st.subheader("Words", anchor=ANCHOR)
+st.header("Words", anchor=ANCHOR)
 show_words(2)

@@ -46,7 +46,7 @@ def page_file(name: str) -> str:
 
 def texts(app: AppTest) -> str:
     """Everything a visitor reads, Markdown's escapes undone."""
-    parts = [*app.title, *app.markdown, *app.caption, *app.info, *app.error, *app.subheader]
+    parts = [*app.title, *app.markdown, *app.caption, *app.info, *app.error, *app.header]
     return "\n".join(unescape(str(part.value).replace("\\", "")) for part in parts)
 
 

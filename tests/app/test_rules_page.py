@@ -37,7 +37,7 @@ def test_the_rule_of_a_link_is_explained(data: str) -> None:
     rules = mined(data, 0.005, 0.95)
     rule = rules.rules[-1]
     app = open_page("rules", data=data, rule=rule.id)
-    assert f"<h4>{escape(sentence(rule, rules))}</h4>" in html(app)
+    assert f"<h2>{escape(sentence(rule, rules))}</h2>" in html(app)
     assert f"{rules.name_of(rule)} ·" in html(app)
     examples = min(10, rule.samples)
     assert html(app).count("<tr") == (1 + 1 + rule.length) + (1 + examples)
@@ -192,7 +192,7 @@ def test_no_rule_is_said_with_what_to_do() -> None:
 
 def test_the_rule_always_is_explained() -> None:
     app = open_page("rules", data="lunar_lander", support="0.5", confidence="0.2")
-    assert "<h4>Always " in html(app)
+    assert "<h2>Always " in html(app)
     assert "This rule has no conditions" in texts(app)
     assert html(app).count("<figure>") == 0
 

@@ -30,7 +30,7 @@ def test_a_card_says_the_rule_and_its_numbers_with_names_escaped(pushed: RuleSet
     rule = max(pushed.rules, key=lambda one: one.samples)
     card = rule_card(rule, pushed, threshold=0.8)
     assert "<b>tilt</b>" not in card
-    assert "<h4>If the &lt;b&gt;tilt&lt;/b&gt; is at most" in card
+    assert "<h2>If the &lt;b&gt;tilt&lt;/b&gt; is at most" in card
     assert f"so did the expert in {100 * rule.confidence:.0f} % of {rule.samples} states." in card
     for part in (f"{pushed.name_of(rule)} ·", f"lift {rule.lift:.2f}", "1 condition on 1 feature"):
         assert part in card

@@ -8,7 +8,7 @@ from sarl_core.explaining.templates import render
 
 
 def heading(text: str) -> Markup:
-    """A heading of the third level.
+    """A heading of the second level, below the title of the page.
 
     Args:
         text: What it says.

@@ -35,7 +35,7 @@ def show_features(
         rows: Each of the d features in numbers.
         divider: Number of intervals of continuous actions.
     """
-    st.subheader("Features")
+    st.header("Features")
     say_of_sample("The bars", demonstrations)
     names = [row.name for row in rows]
     dimensions = label_dimensions(demonstrations, divider)

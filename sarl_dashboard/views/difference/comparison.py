@@ -92,7 +92,7 @@ def _pair(sides: list[Side]) -> tuple[Side, Side]:
     others = {side.name: side for side in sides[1:]}
     name = next(iter(others))
     if len(others) > 1:
-        st.subheader("Closely")
+        st.header("Closely")
         name = st.segmented_control(
             f"{sides[0].name} against",
             list(others),
@@ -171,7 +171,7 @@ def _small(text: str) -> str:
 
 def _headed(title: str, *paragraphs: str) -> str:
     """A heading and what stands below it, in one piece of Markdown."""
-    return "\n\n".join([f"### {title}", *filter(None, paragraphs)])
+    return "\n\n".join([f"## {title}", *filter(None, paragraphs)])
 
 
 def _show_rules(compared: RuleSetComparison) -> None:

@@ -22,7 +22,7 @@ def conflicts(of: Base, verdicts: Verdicts) -> None:
     """Placed rules that overrule others, with an example of each."""
     import pandas as pd
 
-    st.subheader("Conflicts")
+    st.header("Conflicts")
     if not verdicts.conflicts:
         st.caption("No placed rule takes a state from another rule that says something else.")
         return

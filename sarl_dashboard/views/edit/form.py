@@ -136,7 +136,7 @@ def form(base: Base, now: Verdicts) -> None:
     if not any(rule.id == draft.changing for rule in now.rule_set.rules):
         draft.changing = ""  # it was removed meanwhile: what was filled in makes a new one
     changing = draft.changing
-    st.subheader(f"Change {escaped(changing)}" if changing else "Add a rule by hand")
+    st.header(f"Change {escaped(changing)}" if changing else "Add a rule by hand")
     with st.container(border=True, key="manual"):
         asks = [_condition(base, draft, row) for row in list(draft.rows)]
         st.button(

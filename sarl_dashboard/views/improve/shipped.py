@@ -74,7 +74,7 @@ def _show_cards() -> bool:
     names = [name for name in compact_sets() if card_path(compact_file(name)).is_file()]
     if not names:
         return False
-    st.subheader("The compact rules that are shipped")
+    st.header("The compact rules that are shipped")
     name = names[0] if len(names) == 1 else switch("Compact rules", "shipped_set", names)
     show_card(read_object(card_path(compact_file(name)), ADVICE))
     return True
@@ -180,7 +180,7 @@ def show_budgets() -> bool:
     if not points:
         return False
     label = {shipped: label for label, shipped in SHIPPED_SETS.values()}.get(env_id, env_id)
-    st.subheader("How many rules it takes")
+    st.header("How many rules it takes")
     st.caption(
         f"What the best rules of each number achieve on fresh episodes of {escaped(label)}, with a "
         "novice that acts at random. A number of rules is the most of any one action."

@@ -49,7 +49,7 @@ def show_chosen(opened: Library, item: Item, author: str) -> None:
         )
         return
     with st.container(border=True):
-        st.subheader(escaped(item.name))
+        st.header(escaped(item.name))
         facts = [
             KINDS.get(item.kind, "Kept for a link"),
             about(item),

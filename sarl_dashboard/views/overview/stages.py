@@ -51,11 +51,11 @@ def show_stages() -> None:
     name = escaped(upload_name()) if chosen_dataset() == UPLOAD else dataset_label(chosen_dataset())
     raw = raw_demonstrations()
     if raw is None:
-        st.subheader("What is done")
+        st.header("What is done")
         st.caption("There are no data in hand: upload some, or choose a shipped set.")
         stages: tuple[Stage, ...] = (_data(None),)
     else:
-        st.subheader(f"What is done for {name}")
+        st.header(f"What is done for {name}")
         st.caption("In this session. Every line leads to its page.")
         stages = stages_of(raw)
     with st.container(gap=None, key="stages"):

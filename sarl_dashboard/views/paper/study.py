@@ -25,7 +25,7 @@ def show_study(name: str, entry: Entry | None) -> None:
         entry: What the report says of it; None where it has not been made.
     """
     study = STUDIES[name]
-    st.subheader(f"{study.place}. {study.title}")
+    st.header(f"{study.place}. {study.title}")
     if entry is None:
         st.info(
             f"{study.place} has not been made yet. This command makes it:",

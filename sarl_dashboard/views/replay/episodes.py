@@ -46,7 +46,7 @@ def _first(order: ReplayOrder) -> ReplayOrder:
 
 def comparison(order: ReplayOrder) -> None:
     """Several episodes instead of one, on request."""
-    st.subheader("Over several episodes")
+    st.header("Over several episodes")
     ran, order = compared(order), _first(order)
     result = st.container()
     episodes = int(

@@ -69,7 +69,7 @@ def step_by_step(played: Played) -> None:
     """
     replay = played.replay
     steps, shielded = replay.steps, replay.shielded is not None
-    st.subheader("Step by step")
+    st.header("Step by step")
     show_legend(replay.dimensions, marks="changed by the rules" if shielded else "")
     plain = replay.plain.steps
     assert plain is not None  # a replay records them

@@ -41,7 +41,7 @@ def certify_section(lines: Sequence[ShieldLine]) -> None:
     Args:
         lines: What the page compares; those with rules can be certified.
     """
-    st.subheader("Certify")
+    st.header("Certify")
     st.caption(
         "Whether at most so many episodes of a shielded agent fail: a test that stops as soon as "
         "it is shown. What is certified holds for this agent, these rules and episodes that begin "
