@@ -25,6 +25,7 @@ from sarl_dashboard.components.chart import chart
 from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.keeping import keep_result_button
+from sarl_dashboard.components.lists.rows import row_choice, selected_row
 from sarl_dashboard.components.safety import safety_tiles
 from sarl_dashboard.components.settings import notes_notice
 from sarl_dashboard.components.tables import action_column
@@ -105,10 +106,12 @@ def table(ablation: Ablation, choice: AblationChoice) -> None:
     """All rules that were taken out; one can be chosen."""
     import pandas as pd
 
+    rule_set = ablation.shield.rule_set
     columns = ablation_columns(ablation)
     columns["Verdict"] = [[verdict] for verdict in columns["Verdict"]]
     columns["Action"] = [[action] for action in columns["Action"]]
     rows = len(ablation.rules)
+    names = [rule_set.name_of(rule_set.rules[index]) for index in ablation.rules]
     chosen = st.dataframe(
         pd.DataFrame(columns),
         hide_index=True,
@@ -119,6 +122,7 @@ def table(ablation: Ablation, choice: AblationChoice) -> None:
         selection_mode="single-row",
         alt="What became of the episodes without each rule",
     )
+    row_choice("ablation_table", names, selected_row("ablation_table", rows))
     with st.container(horizontal=True, vertical_alignment="center"):
         st.caption(
             "Click a heading to sort, the box at the left of a row to read the rule.",
@@ -130,7 +134,6 @@ def table(ablation: Ablation, choice: AblationChoice) -> None:
         keep_result_button(lambda: csv(ablation), file, key="keep_ablation")
     picked = chosen["selection"]["rows"]
     if picked and picked[0] < rows:
-        rule_set = ablation.shield.rule_set
         rule = rule_set.rules[ablation.rules[picked[0]]]
         with st.container(border=True):
             st.markdown(f"**{rule_set.name_of(rule)}.** {escaped(sentence(rule, rule_set))}")

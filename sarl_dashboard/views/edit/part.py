@@ -21,6 +21,7 @@ from sarl_core.shielding.effects import Verdicts, change
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.components.journey.words import with_words
+from sarl_dashboard.components.lists.rows import row_choice
 from sarl_dashboard.components.tables import row_height, table_height
 from sarl_dashboard.state import edits, in_force
 from sarl_dashboard.state.data import chosen_demonstrations, held_out_demonstrations
@@ -205,7 +206,7 @@ def _queries(chosen: TreePart) -> None:
     key = f"regrow_table_{hash((chosen.base.key, tuple(texts)))}"
 
     def pick() -> None:
-        rows = st.session_state[key].selection.rows
+        rows = st.session_state[key]["selection"]["rows"]
         set_url_choice("regrow", texts[rows[0]] if rows and rows[0] < len(texts) else "")
 
     names = _query_texts(chosen.tree, queries, demonstrations)
@@ -222,6 +223,7 @@ def _queries(chosen: TreePart) -> None:
         selection_default={"selection": {"rows": [] if row is None else [row]}},
         alt="The next best conditions at the node, with what each would do",
     )
+    row_choice(key, names, row, pick)
     st.caption(
         "Of each feature the threshold that parts the expert's actions best; the first row is as "
         "it is now. The numbers are of the rules mined at the thresholds, without other edits. "

@@ -19,6 +19,7 @@ from sarl_core.mining.rules import Rule
 from sarl_core.shielding.effects import Verdicts
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.lists.pages import follow, number_of_pages, page_choice
+from sarl_dashboard.components.lists.rows import row_choice
 from sarl_dashboard.components.lists.rule_search import have_word, names_have_word
 from sarl_dashboard.components.settings import search_box, switch
 from sarl_dashboard.components.tables import action_column, row_height, table_height
@@ -98,7 +99,7 @@ def _page_rows(
     rule_set = verdicts.rule_set
 
     def pick() -> None:
-        selected = st.session_state[key].selection.rows
+        selected = st.session_state[key]["selection"]["rows"]
         if selected and selected[0] < len(places):
             set_url_choice("rule", rule_set[int(places[selected[0]])].id)
 
@@ -115,6 +116,7 @@ def _page_rows(
         selection_default={"selection": {"rows": [] if row is None else [row]}},
         alt="The rules with all edits",
     )
+    row_choice(key, [rule_set.name_of(rule_set[int(place)]) for place in places], row, pick)
 
 
 def _touched(rule: Rule) -> bool:

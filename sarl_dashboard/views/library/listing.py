@@ -15,6 +15,7 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.library import Item, Library
 from sarl_core.library.bundles import ENDING, import_bundle
 from sarl_core.mining.language import counted
+from sarl_dashboard.components.lists.rows import row_choice
 from sarl_dashboard.components.tables import select_row, table_height
 from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import refuse
@@ -82,6 +83,7 @@ def choose_item(opened: Library, author: str) -> Item | None:
             "Name": st.column_config.TextColumn(width="medium"),
         },
     )
+    row_choice("library_table", [one.name for one in items], row, partial(_choose, identifiers))
     if item is None:
         st.caption(f"{counted(len(items), 'thing')}. Choose a row to open, share or remove it.")
     return item
@@ -89,7 +91,7 @@ def choose_item(opened: Library, author: str) -> Item | None:
 
 def _choose(identifiers: Sequence[str]) -> None:
     """Let the address name the row that was chosen."""
-    rows = st.session_state["library_table"].selection.rows
+    rows = st.session_state["library_table"]["selection"]["rows"]
     set_url_choice("item", identifiers[rows[0]] if rows else "")
 
 
