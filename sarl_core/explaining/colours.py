@@ -91,6 +91,23 @@ def layer_colour(share: float) -> tuple[str, str]:
     return ground, dark if _contrast(ground, dark) >= _contrast(ground, light) else light
 
 
+def chip_colour(colour: str) -> str:
+    """A colour, darkened until white can be read on it: at least 4.5 to 1.
+
+    Args:
+        colour: As "#0072B2".
+
+    Returns:
+        Of the same hue; the colour itself where it is dark enough.
+    """
+    channels = [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
+    darker = (
+        "#" + "".join(f"{channel * part // 100:02X}" for channel in channels)
+        for part in range(100, -1, -1)
+    )
+    return next(one for one in darker if _contrast(one, "#ffffff") >= 4.5)
+
+
 def _contrast(one: str, other: str) -> float:
     """The contrast of two colours as WCAG defines it, 1 to 21."""
     first, second = sorted((_luminance(one), _luminance(other)))

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import streamlit as st
 
 from sarl_core.demonstrations.derived import Combination
-from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.colours import chip_colour, label_colour
 from sarl_core.explaining.tables.evidence import held_out_columns
 from sarl_core.explaining.tables.rules import rule_columns
 from sarl_core.explaining.words.evidence import VERDICT_COLOURS, VERDICTS
@@ -36,14 +36,17 @@ def action_column(
         forbidding: Never-rules among the rules, each in the colour of what it forbids.
     """
     colours = {
-        action_text(label, dimension): label_colour(label)
+        action_text(label, dimension): chip_colour(label_colour(label))
         for dimension in actions
         for label in range(dimension.n_labels)
     } | {says_text(rule, actions[rule.dimension]): label_colour(rule.label) for rule in forbidding}
     # About seven pixels a letter; what a long action takes, the conditions give.
     width = min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250)
     column = st.column_config.MultiselectColumn(
-        width=width, help=meaning, options=list(colours), color=list(colours.values())
+        width=width,
+        help=meaning,
+        options=list(colours),
+        color=list(colours.values()),
     )
     return column, width
 
@@ -95,7 +98,7 @@ def column_config(rule_set: RuleSet) -> dict[str, Any]:
             "confidence (reached), below it (too low), or on both sides (open); none with fewer "
             f"than {FEWEST_EPISODES} episodes",
             options=list(VERDICTS.values()),
-            color=[VERDICT_COLOURS[name] for name in VERDICTS],
+            color=[chip_colour(VERDICT_COLOURS[name]) for name in VERDICTS],
         ),
         "Lower bound": column.NumberColumn(
             width=95,

@@ -9,6 +9,7 @@ from typing import Any
 import streamlit as st
 
 from sarl_core.environments.failures import no_failures_text
+from sarl_core.explaining.colours import chip_colour
 from sarl_core.explaining.figures.ablation import (
     FIGURE_ROWS,
     METHOD,
@@ -165,7 +166,7 @@ def column_config(ablation: Ablation) -> dict[str, Any]:
         "Rule": column.TextColumn(pinned=True, width=76),
         "Verdict": column.MultiselectColumn(
             options=[verdict.capitalize() for verdict in VERDICT_COLOURS],
-            color=list(VERDICT_COLOURS.values()),
+            color=list(map(chip_colour, VERDICT_COLOURS.values())),
             width=160,
             help="Load-bearing: without it the return is lower, or more episodes fail. Harmful: "
             "the other way round.",

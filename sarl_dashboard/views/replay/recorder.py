@@ -13,7 +13,7 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.decimals import digits_across
-from sarl_core.explaining.colours import label_colour
+from sarl_core.explaining.colours import chip_colour, label_colour
 from sarl_core.explaining.exports.steps import RecordedSteps, steps_to_csv, steps_to_parquet
 from sarl_core.explaining.html.headings import heading
 from sarl_core.explaining.tables.recorder import (
@@ -286,7 +286,7 @@ def column_config(recorded: Recorded) -> dict[str, Any]:
                 widest = 30 + 7 * max(map(len, names))
                 columns[title] = column.MultiselectColumn(
                     options=names,
-                    color=[label_colour(label) for label in labels],
+                    color=[chip_colour(label_colour(label)) for label in labels],
                     width=min(max(widest, 90), 190),
                     help=meaning,
                 )
