@@ -17,6 +17,7 @@ import pytest
 import sarl_core
 from docs.scripts import compact_table, freedom, large_page
 from sarl_core import load_demonstrations, mine_never_rules, mine_rules, with_combinations
+from sarl_core.explaining.figures.rules.freedom import FreedomPoint, point_front
 from sarl_core.mining.language import sentence
 
 from .examples import ROOT, run
@@ -149,11 +150,11 @@ def test_the_table_of_freedom_is_that_of_what_was_measured():
 
 def test_on_the_front_of_freedom_is_what_no_other_beats():
     def point(failures, free):
-        return {"failures": failures, "freedom": free}
+        return FreedomPoint("never", 1, "", free, failures, 10, 0.0, 1.0)
 
     best = [point(1, 0.0), point(5, 0.6), point(9, 1.0)]
     beaten = [point(2, 0.0), point(5, 0.5), point(6, 0.6), point(9, 0.9)]
-    assert freedom.front([*beaten, *best[::-1]]) == best
+    assert point_front([*beaten, *best[::-1]]) == best
 
 
 def test_the_guide_is_built_and_every_link_leads_somewhere(tmp_path):

@@ -1,7 +1,7 @@
 """What rules prevent, against what they leave to an agent: `python -m docs.scripts.freedom`.
 
 A novice in Lunar Lander plays the same fresh episodes under rules of every kind. Writes
-docs/results/freedom.json after every set, the pictures and the table of the page. Rule sets that
+data/rules/freedom.json after every set, the pictures and the table of the page. Rule sets that
 `sarl probe` has made are named on the command line. A set that is in the file already is not
 played again; delete the file to begin anew.
 """
@@ -19,7 +19,13 @@ import plotly.graph_objects as go
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import load_demonstrations
 from sarl_core.explaining.figures.png import figure_to_png
-from sarl_core.explaining.ticks import share_ticks
+from sarl_core.explaining.figures.rules.freedom import (
+    FEATURES,
+    KINDS,
+    FreedomPoint,
+    freedom_figure,
+    point_front,
+)
 from sarl_core.files import whole_file
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.combining.choice import with_combinations
@@ -33,7 +39,7 @@ from sarl_core.shielding.shield import Shield
 
 DOCS = Path(__file__).resolve().parents[1]
 DATA = DOCS.parent / "data"
-JSON, PAGE = DOCS / "results" / "freedom.json", DOCS / "guides" / "never_rules.md"
+JSON, PAGE = DATA / "rules" / "freedom.json", DOCS / "guides" / "never_rules.md"
 PICTURES = DOCS / "pictures"
 BEGIN = "<!-- made by: python -m docs.scripts.freedom -->"
 END = "<!-- end of what is made -->"
@@ -55,18 +61,6 @@ NEVER = (
 MIXED = ((0.005, 0.95, 0.05), (0.005, 0.95, 0.1), (0.005, 0.9, 0.1), (0.005, 0.8, 0.1))
 """Support, confidence and epsilon."""
 SHIPPED = ("lunar_lander_compact", "lunar_lander_combined", "lunar_lander_few_combined")
-
-KINDS = {
-    "none": ("no rules", "#8796A3", "x"),
-    "demand": ("demand", "#0072B2", "circle"),
-    "mixed": ("demand and forbid", "#009E73", "square"),
-    "never": ("forbid", "#CC79A7", "triangle-up"),
-    "shipped": ("compact sets", "#E69F00", "diamond"),
-    "probed": ("forbid, from probes", "#D55E00", "star"),
-}
-"""What each kind of rules is called, its colour and its symbol."""
-FEATURES = {None: "", 1: ", one feature", 2: ", two features"}
-
 
 HEAD = (
     *("rules", "at", "freedom", "failures, 95 % interval", "mean return"),
@@ -91,7 +85,7 @@ def main() -> None:
         print(points[-1], flush=True)
     for dark in (False, True):
         with whole_file(PICTURES / f"freedom{'_dark' * dark}.png") as unfinished:
-            unfinished.write_bytes(figure_to_png(freedom_figure(points, dark=dark)))
+            unfinished.write_bytes(figure_to_png(picture(points, dark=dark)))
     page = with_table(PAGE.read_text("utf-8"), points)
     with whole_file(PAGE) as unfinished:
         unfinished.write_text(page, "utf-8")
@@ -150,77 +144,17 @@ def played(rules: RuleSet | None, jobs: int) -> dict[str, Any]:
     }
 
 
-def front(points: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Those that no other beats: with fewer failures and no less freedom, or the reverse."""
-
-    def beats(one: dict[str, Any], other: dict[str, Any]) -> bool:
-        fewer, freer = one["failures"] - other["failures"], one["freedom"] - other["freedom"]
-        return fewer <= 0 and freer >= 0 and (fewer < 0 or freer > 0)
-
-    best = [one for one in points if not any(beats(other, one) for other in points)]
-    return sorted(best, key=lambda one: float(one["freedom"]))
-
-
-def freedom_figure(points: Sequence[dict[str, Any]], *, dark: bool) -> go.Figure:
-    """Freedom to the right, failures upwards with their intervals; the front as a line."""
+def picture(points: Sequence[dict[str, Any]], *, dark: bool) -> go.Figure:
+    """The figure of all sets, for a page."""
     ground, ink = ("#1e2129", "#d5dce2") if dark else ("#ffffff", "#1d2730")
-    figure = go.Figure()
-    best = front(points)
-    figure.add_scatter(
-        x=[one["freedom"] for one in best],
-        y=[one["failures"] / one["episodes"] for one in best],
-        mode="lines",
-        name="no other is better",
-        # A staircase: between two points there is none.
-        line={"color": ink, "width": 1.4, "dash": "dot", "shape": "vh"},
-    )
-    for kind, (name, colour, symbol) in KINDS.items():
-        for features in FEATURES:
-            chosen = [
-                one for one in points if (one["kind"], one.get("features")) == (kind, features)
-            ]
-            if not chosen:
-                continue
-            rates = [one["failures"] / one["episodes"] for one in chosen]
-            figure.add_scatter(
-                x=[one["freedom"] for one in chosen],
-                y=rates,
-                mode="markers",
-                name=f"{name}{FEATURES[features]}",
-                marker={
-                    "color": colour,
-                    "size": 11 if kind in ("shipped", "probed") else 9,
-                    "symbol": symbol if features != 2 else f"{symbol}-open",
-                    "line": {"width": 1.8 if features == 2 else 0},
-                },
-                error_y={
-                    "type": "data",
-                    "symmetric": False,
-                    "array": [
-                        one["failure_high"] - rate for one, rate in zip(chosen, rates, strict=True)
-                    ],
-                    "arrayminus": [
-                        rate - one["failure_low"] for one, rate in zip(chosen, rates, strict=True)
-                    ],
-                    "thickness": 1,
-                    "width": 0,
-                },
-                cliponaxis=False,
-            )
+    figure = freedom_figure(list(map(FreedomPoint.of, points)), front=True, dark=dark)
     figure.update_layout(
         width=720,
         height=600,
-        margin={"l": 66, "r": 20, "t": 16, "b": 56},
         paper_bgcolor=ground,
         plot_bgcolor=ground,
         font={"color": ink, "size": 14},
-        legend={"orientation": "h", "x": 0, "y": -0.16, "yanchor": "top"},
     )
-    grid = {"gridcolor": "rgba(128,128,128,0.25)", "zeroline": False, **share_ticks(0, 1)}
-    figure.update_xaxes(
-        title={"text": "freedom: what is left to the novice"}, range=[-0.02, 1.02], **grid
-    )
-    figure.update_yaxes(title={"text": "episodes that fail"}, range=[-0.02, 1.03], **grid)
     return figure
 
 
@@ -232,7 +166,7 @@ def with_table(page: str, points: Sequence[dict[str, Any]]) -> str:
 
 def freedom_table(points: Sequence[dict[str, Any]]) -> str:
     """The sets that no other beats, in bold, and of each kind that with the fewest failures."""
-    best = [one["digest"] for one in front(points)]
+    best = point_front(list(map(FreedomPoint.of, points)))
     rows = []
     for kind, (name, _, _) in KINDS.items():
         for features in FEATURES:
@@ -241,9 +175,9 @@ def freedom_table(points: Sequence[dict[str, Any]]) -> str:
             ]
             least = min((one["failures"] for one in of_kind), default=0)
             rows += [
-                _row(name, one, bold=one["digest"] in best)
+                _row(name, one, bold=FreedomPoint.of(one) in best)
                 for one in of_kind
-                if one["digest"] in best or one["failures"] == least
+                if FreedomPoint.of(one) in best or one["failures"] == least
             ]
     return "\n".join([f"| {' | '.join(HEAD)} |", f"|{' --- |' * len(HEAD)}", *rows])
 

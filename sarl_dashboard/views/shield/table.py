@@ -21,6 +21,7 @@ from sarl_dashboard.components.safety import freedom_cell, safety_column_config,
 from sarl_dashboard.jobs.episodes import COMPARISON, known, take_up_work
 from sarl_dashboard.state.agents import AGENTS
 from sarl_dashboard.text import escaped
+from sarl_dashboard.views.shield.freedom import show_freedom
 from sarl_dashboard.views.shield.lines import ShieldLine
 
 HEIGHT = 400
@@ -105,6 +106,7 @@ def show(finished: Finished, *, at_work: bool) -> None:
         column_config=column_config(env_id),
         key="comparison_table",
     )
+    show_freedom(finished)
     if not at_work:
         name = env_id.rsplit("/", 1)[-1].rsplit(":", 1)[-1]
         with st.container(horizontal=True):
