@@ -70,8 +70,8 @@ def _about(shipped: Sequence[FreedomPoint], alike: bool) -> str:
     if not shipped:
         return text
     text += (
-        " All other points are a shipped measurement: sets of rules of every kind, and none, with a "
-        f"novice that acts at random in Lunar Lander, {shipped[0].episodes} episodes for each on "
+        " All other points are a shipped measurement: sets of rules of every kind, and none, with "
+        f"a novice that acts at random in Lunar Lander, {shipped[0].episodes} episodes for each on "
         "seeds of their own."
     )
     return text if alike else f"{text} They say nothing of other agents than the novice."
