@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import streamlit as st
 
 from sarl_core.errors import InputError
-from sarl_core.mining.rule_set import require_demands
 from sarl_core.rollouts.player import check_environment
 from sarl_core.shielding.shield import Shield
 from sarl_core.studies.ablation import MOST_RULES
@@ -123,7 +122,6 @@ def settings() -> AblationChoice:
             "choose other rules"
         )
     no_boxes_notice([rule_set], outside)
-    require_demands(rule_set, "taking rules out one by one")
     notes_notice(check_environment(env_id, Shield(rule_set)).notes)
     row = Row("all rules", env_id, first, chosen, rule_set, projection, outside)
     wanted = Wanted(row, int(episodes or LEAST_EPISODES), int(most or 1))

@@ -156,7 +156,9 @@ def query() -> Mapping[str, str]:
 def column_config(ablation: Ablation) -> dict[str, Any]:
     """What the columns look like, and what they mean."""
     column = st.column_config
-    action, action_width = action_column(ablation.shield.rule_set.actions, "What the rule says")
+    rule_set = ablation.shield.rule_set
+    forbidding = [rule for rule in rule_set.rules if rule.forbids]
+    action, action_width = action_column(rule_set.actions, "What the rule says", forbidding)
     failures = (
         f"Of {len(ablation.base):,} episodes; with all rules it is {ablation.base_failures:,}"
         if ablation.failures_known
