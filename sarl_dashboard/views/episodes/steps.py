@@ -21,7 +21,7 @@ from sarl_dashboard.components.settings import other_data_notice
 from sarl_dashboard.components.timeline import clicked_step, mark_at, mark_room, show_legend
 from sarl_dashboard.session import end_page
 from sarl_dashboard.state import in_force
-from sarl_dashboard.text import escaped, refuse
+from sarl_dashboard.text import refuse
 from sarl_dashboard.views.episodes.scene import show_scene
 
 _MOST_STEPS = 2_000  # that are drawn at once; of a longer episode, those around the step
@@ -135,7 +135,7 @@ def _figures(held: Audit, rows: slice, current: int) -> None:
             alt="What the expert did at each step, what the rule in force says, and the breaks",
         )
         if chosen:
-            names = ", ".join(escaped(features[index].name) for index in chosen)
+            names = ", ".join(features[index].name for index in chosen)
             st.plotly_chart(
                 feature_lines(
                     [features[index] for index in chosen],

@@ -48,7 +48,7 @@ def show_maps(display: Display, landscape: Landscape | NeverLandscape) -> None:
                         alt=f"{styles[layer].title}, for every minimum support and {other}",
                     )
     st.caption(
-        "Click a cell to set both thresholds to it. "
+        "Click a cell to set both thresholds to it; with the keys, move the two sliders. "
         + (
             "The ring marks the present ones."
             if display.compact is None
