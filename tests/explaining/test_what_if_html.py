@@ -113,7 +113,7 @@ def test_how_the_rules_met_the_action_and_what_is_executed(state, action, outsid
     looks = style_sheet()
     for one in shown:
         assert all(f".{name} {{" in looks for name in one.get("class").split() if name != PLAIN)
-    (title,) = root.iter("h4")
+    (title,) = root.iter("h2")
     assert title.text == heading
 
 

@@ -36,7 +36,7 @@ def show_work(author: str) -> None:
         if not jobs and not ended:
             return
         with st.container(border=True):
-            st.subheader("Work")
+            st.header("Work")
             for place, job in enumerate(jobs):
                 _line(job, place)
             for place, record in enumerate(ended):
