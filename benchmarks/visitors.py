@@ -103,7 +103,7 @@ def _aim(page: Page, move: int) -> Release:
 
 def uploads(quick: bool) -> Iterable[Row]:
     """Memory of the server after many uploads, each by another visitor who then goes."""
-    with tempfile.TemporaryDirectory() as name, _server() as (address, browser, _):
+    with tempfile.TemporaryDirectory() as name, _server() as (address, browser, log):
         file = Path(name) / "upload.parquet"
         few = demonstrations()
         before, most = 0.0, 0.0
@@ -124,6 +124,7 @@ def uploads(quick: bool) -> Iterable[Row]:
             most = max(most, _metric(address, "sarl_memory_bytes"))
         time.sleep(GONE)
         after = _metric(address, "sarl_memory_bytes")
+        fine = "Traceback" not in log.read_text()
     yield Row(
         f"memory after {count} uploads, their visitors gone",
         "after the first",
@@ -132,6 +133,7 @@ def uploads(quick: bool) -> Iterable[Row]:
         1.25,
         f"{after / 1e6:,.0f} MB, {before / 1e6:,.0f} MB after the first, {most / 1e6:,.0f} MB "
         "at most; with the server's processes",
+        fine,
     )
 
 
