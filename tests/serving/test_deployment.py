@@ -10,7 +10,7 @@ from sarl_core.serving.limits import ServerLimits
 from sarl_core.serving.settings import read_settings
 
 ROOT = Path(__file__).resolve().parents[2]
-DEPLOYMENT = ROOT / "deployment"
+DEPLOYMENT = ROOT / "examples" / "deployment"
 
 
 def test_the_shipped_settings_are_the_usual_ones_and_those_of_the_guide(tmp_path: Path) -> None:
