@@ -25,5 +25,5 @@ def test_what_numbers_mean_can_be_read_without_a_pointer() -> None:
 
 
 def test_headings_and_notes_are_no_markup() -> None:
-    assert heading("<i>a</i>").endswith(">&lt;i&gt;a&lt;/i&gt;</h3>")
+    assert heading("<i>a</i>").endswith(">&lt;i&gt;a&lt;/i&gt;</h2>")
     assert note("<i>a</i>").endswith(">&lt;i&gt;a&lt;/i&gt;</p>")
