@@ -31,7 +31,7 @@ from sarl_core.explaining.report.rules import in_order, rules_part
 from sarl_core.explaining.report.slides import slides_document
 from sarl_core.explaining.report.summary import summary_part
 from sarl_core.explaining.report.tally import Tally, report_rules, same_environment, tally
-from sarl_core.explaining.report.thresholds import thresholds_part
+from sarl_core.explaining.report.thresholds import achieved_text, thresholds_part
 from sarl_core.explaining.templates import render
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
@@ -266,6 +266,7 @@ def make_report(
             certified=certified,
             gaps=uncovered,
             elsewhere=elsewhere,
+            achieved=achieved_text(card),
             sign_off=wishes.sign_off,
         ),
         "key_numbers": _key_numbers(rule_set, counts),

@@ -90,6 +90,7 @@ def summary_part(
     certified: CertificatesPart,
     gaps: UncoveredSummary,
     elsewhere: Sequence[str],
+    achieved: str,
     sign_off: SignOff | None,
 ) -> SummaryPart:
     """The first page of a report.
@@ -102,6 +103,8 @@ def summary_part(
         certified: What is certified.
         gaps: What the rules do not reach.
         elsewhere: What they are worth where they were not mined, in sentences.
+        achieved: What an agent that follows them achieved where they were made, as a sentence; ""
+            where it is not known.
         sign_off: Who approved them; None where it is not known.
 
     Returns:
@@ -111,7 +114,7 @@ def summary_part(
     env_id = demonstrations.env_id or rule_set.source.env_id
     return SummaryPart(
         demonstrated=_demonstrated(rule_set, demonstrations, counts),
-        effects=_effects(rule_set, pairs, results, env_id),
+        effects=_effects(rule_set, pairs, results, env_id, achieved),
         outcomes=_outcomes(pairs),
         certainty=(*_certainty(pairs), *certified.verdicts, *(text for text in elsewhere if text)),
         uncovered=_uncovered(counts, gaps),
@@ -171,7 +174,11 @@ def _demonstrated(
 
 
 def _effects(
-    rule_set: RuleSet, pairs: Sequence[Pair], results: Sequence[Result], env_id: str
+    rule_set: RuleSet,
+    pairs: Sequence[Pair],
+    results: Sequence[Result],
+    env_id: str,
+    achieved: str,
 ) -> tuple[str, ...]:
     if not pairs:
         lacking = (
@@ -179,10 +186,11 @@ def _effects(
             if not results
             else "No agent was measured under the rules"
         )
-        return (
+        unknown = (
             f"{lacking}: whether these rules help an agent or harm it is not known from it. "
-            f"{_how_to_measure(env_id)}",
+            f"{_how_to_measure(env_id)}"
         )
+        return (achieved, unknown) if achieved else (unknown,)
     sentences = [_effect(pair) for pair in pairs[:MOST_PAIRS]]
     if len(pairs) > MOST_PAIRS:
         sentences.append(f"Section 5 has all {counted(len(pairs), 'comparison')}.")

@@ -161,6 +161,25 @@ def read_card(rules: Path) -> Mapping[str, Any] | None:
     return read_object(path, "mend this card or take it away")
 
 
+def achieved_text(card: Mapping[str, Any] | None) -> str:
+    """What an agent that follows the rules achieved where they were made.
+
+    Args:
+        card: Of the rule file, None without one.
+
+    Returns:
+        A sentence; "" where the card does not say.
+    """
+    reported = fitting(fitting(card, _RuleSetCard).reported, _Reported)
+    if reported.mean is None:
+        return ""
+    failed = "" if reported.rate is None else f"; failures: {rate_text(reported.rate)}"
+    return (
+        "Where the rules were made, an agent that follows them had a mean return of "
+        f"{number_text(reported.mean)}{_with(' over {} episodes', reported.episodes)}{failed}."
+    )
+
+
 def thresholds_part(
     rule_set: RuleSet,
     tally: Tally,
