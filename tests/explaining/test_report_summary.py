@@ -65,7 +65,7 @@ def test_without_a_comparison_the_first_page_says_how_to_get_one(cart: Demonstra
 def test_the_first_page_says_what_the_card_of_the_rules_reports(cart: Demonstrations) -> None:
     card = {"reported": {"episodes": 1000, "mean": 251.29, "failures": 23}}
     page = first_page(reported(cart, card=card))
-    assert "an agent that follows them had a mean return of 251.29 over 1,000 episodes." in page
+    assert "an agent that follows them had a mean return of 251 over 1,000 episodes." in page
     assert "Nothing was measured for this report" in page
     card["reported"] |= {"failure_low": 0.0146, "failure_high": 0.0343}
     assert "failures: 23 of 1,000" in first_page(reported(cart, card=card))
