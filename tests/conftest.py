@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import os
 
+# Two workers have two cores: threads of theirs would wait for each other, spinning. Matrices are
+# small here, and processes that tests start inherit it.
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
 import numpy as np
 import pytest
 from hypothesis import settings

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from sarl_core.cli.app import main
+from sarl_core.clusters import cluster
 
 ROOT = Path(__file__).resolve().parents[2]
 CART = str(ROOT / "data" / "demonstrations" / "cartpole.parquet")
@@ -31,3 +32,10 @@ def cart_rules(tmp_path_factory):
     path = tmp_path_factory.mktemp("rules") / "rules.json"
     assert main(["mine", CART, "--support", "0", "--confidence", "0.9", "--out", str(path)]) == 0
     return path
+
+
+@pytest.fixture(scope="module")
+def running_cluster():
+    """The address of a cluster of two processes, which does not end with the commands."""
+    with cluster("local:2") as client:
+        yield client.scheduler.address

@@ -207,11 +207,11 @@ def test_a_cluster_gives_the_document_of_one_memory(
 
 
 def test_a_cluster_says_what_it_does_not_write(
-    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, running_cluster: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pattern = str(folder / "*.parquet")
     out = tmp_path / "audited"
-    assert main(["audit", RULES, pattern, "--cluster", "local:1", "--out", str(out)]) == 0
+    assert main(["audit", RULES, pattern, "--cluster", running_cluster, "--out", str(out)]) == 0
     said = capsys.readouterr().out
     assert "It has no steps.csv: the steps stay in the files." in said
     assert "15,000 in 30 episodes" in said
@@ -230,9 +230,13 @@ def test_a_cluster_says_what_it_does_not_write(
     ],
 )
 def test_what_a_cluster_cannot_do_is_one_sentence(
-    log: str, arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
+    log: str,
+    arguments: list[str],
+    said: str,
+    running_cluster: str,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert main(["audit", RULES, log, "--cluster", "local:1", *arguments]) == 2
+    assert main(["audit", RULES, log, "--cluster", running_cluster, *arguments]) == 2
     out, error = capsys.readouterr()
     assert out == ""
     assert error.count("\n") == 1
