@@ -111,11 +111,11 @@ def run_through(app: AppTest, name: str) -> AppTest:
 
 
 def finished(app: AppTest, name: str) -> AppTest:
-    """Look in until work is done, as the browser does every second."""
-    for _ in range(3_000):
+    """Look in until work is done, as the browser does every second; at first more often."""
+    for look in range(1, 800):
         assert not app.exception, app.exception
         if f"cancel_{name}" not in [button.key for button in app.button]:
             return app
-        time.sleep(0.1)
+        time.sleep(min(0.1 * look, 0.5))  # to draw the page takes time from the work
         app.run()
     raise AssertionError("the work does not end")
