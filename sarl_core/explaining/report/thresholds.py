@@ -173,10 +173,11 @@ def achieved_text(card: Mapping[str, Any] | None) -> str:
     reported = fitting(fitting(card, _RuleSetCard).reported, _Reported)
     if reported.mean is None:
         return ""
+    over = f" over {counted(reported.episodes, 'episode')}" if reported.episodes else ""
     failed = "" if reported.rate is None else f"; failures: {rate_text(reported.rate)}"
     return (
         "Where the rules were made, an agent that follows them had a mean return of "
-        f"{number_text(reported.mean)}{_with(' over {} episodes', reported.episodes)}{failed}."
+        f"{number_text(reported.mean)}{over}{failed}."
     )
 
 
