@@ -98,7 +98,9 @@ SETS = {
         "lunar_lander_continuous", _CONTINUOUS_LANDER, "every"
     ),
     "bipedal_walker_combined": RuleSetPlan("bipedal_walker", _WALKER, _BODY),
-    "pendulum_combined": RuleSetPlan("pendulum", _PENDULUM, "every"),
+    "pendulum_combined": RuleSetPlan(
+        "pendulum", replace(_PENDULUM, turns=2, search_episodes=64), "every"
+    ),
     "pendulum_compact": RuleSetPlan("pendulum", _PENDULUM),
 }
 

@@ -21,6 +21,7 @@ SHIPPED = {
     "lunar_lander_combined.json": ("LunarLander-v3", 24, 265.0),
     "lunar_lander_few_combined.json": ("LunarLander-v3", 8, 240.0),
     "lunar_lander_compact.json": ("LunarLander-v3", 48, 200.0),
+    "pendulum_combined.json": ("Pendulum-v1", 16, -175.0),
     "bipedal_walker_compact.json": ("BipedalWalker-v3", 128, 250.0),
     "driving_compact.json": ("Driving-v0", 24, 22.0),
 }
