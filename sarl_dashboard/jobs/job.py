@@ -207,12 +207,12 @@ class Place(Generic[Result]):
         """Look at work that was begun here and left, where nothing was begun since.
 
         Args:
-            key: Of what is looked at.
+            key: Of what is looked at; None where that alone does not tell which work is about it.
 
         Returns:
             Whether there is any.
         """
-        if self.job is not None:
+        if self.job is not None or key is None:
             return False
         for job in (*queue().running, *queue().waiting):
             here = (job.place, job.key) == (self.name, key)
