@@ -53,8 +53,10 @@ def signed_in() -> str:
     said = (str(st.user.get(key) or "").strip() for key in ("name", "email"))
     unwanted = str.maketrans("", "", "<>")
     name, email = ("".join(filter(str.isprintable, text)).translate(unwanted) for text in said)
-    if not (name and email):
-        return (name or email)[:_LONGEST_NAME]
+    if not email:
+        return name.replace("@", " at ")[:_LONGEST_NAME]  # or it could be somebody's address
+    if not name:
+        return email[:_LONGEST_NAME]
     return f"{name[: _LONGEST_NAME - len(email) - 3]} <{email}>"
 
 

@@ -60,5 +60,7 @@ def _sign_in(provider: str) -> None:
 
 def _providers() -> list[str]:
     """The names of those who vouch for visitors; "" for the only one, which needs none."""
-    auth = st.secrets["auth"]
-    return [name for name, value in auth.items() if isinstance(value, Mapping)] or [""]
+    # Beside them may stand a table of what is said to the only one, which is no provider.
+    sections = dict(st.secrets["auth"])
+    sections.pop("client_kwargs", None)
+    return [name for name, value in sections.items() if isinstance(value, Mapping)] or [""]
