@@ -37,8 +37,8 @@ def show_work(author: str) -> None:
             return
         with st.container(border=True):
             st.header("Work")
-            for place, job in enumerate(jobs):
-                _line(job, place)
+            for job in jobs:
+                _line(job)
             for place, record in enumerate(ended):
                 _ended_line(record, place)
 
@@ -58,11 +58,14 @@ def _ended(author: str) -> list[EndedJob]:
     return [one for one in queue().ended if one.author == author and one.ended > since][:_LISTED]
 
 
-def _line(job: Job[Any], place: int) -> None:
+def _line(job: Job[Any]) -> None:
+    # By the job and not by its place: what stands here moves up when another has ended, and a press
+    # that is under way must not call off the next one.
+    name = f"{id(job):x}"
     with st.container(horizontal=True, vertical_alignment="center"):
         st.progress(job.share, f"**{escaped(job.page)}.** {escaped(job.text)}", width=_PROGRESS)
-        _open(job.address, f"open_job_{place}")
-        st.button("Cancel", icon=":material/close:", key=f"cancel_job_{place}", on_click=job.cancel)
+        _open(job.address, f"open_job_{name}")
+        st.button("Cancel", icon=":material/close:", key=f"cancel_job_{name}", on_click=job.cancel)
 
 
 def _ended_line(record: EndedJob, place: int) -> None:
