@@ -157,6 +157,10 @@ def report(
     terminal.check_output(out, (".html", ".pdf"))
     if slides is not None:
         terminal.check_output(slides, (".html",), option="--slides")
+        if slides.resolve() == out.resolve():
+            raise InputError(
+                f"--slides and --out both name {out}; write the slides to another file"
+            )
     with terminal.working("Making the report") as advance:
         from sarl_core.demonstrations.formats.mapping.roles import as_options
         from sarl_core.demonstrations.recoding import recoded

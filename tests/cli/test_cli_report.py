@@ -62,11 +62,12 @@ def test_results_and_the_card_stand_in_it(run, tmp_path):
     [
         (("--demonstrations", LANDER), "4 features and the demonstrations have 8"),
         (("--demonstrations", "missing.parquet"), "missing.parquet"),
-        (("--demonstrations", CART, "--out", "report.pdf"), ".html"),
+        (("--demonstrations", CART, "--out", "report.docx"), ".html"),
         (("--demonstrations", CART, "--comparison", "missing.csv"), "missing.csv"),
         (("--demonstrations", CART, "--frames", "99"), "number of pictures a rule is 99"),
         (("--demonstrations", CART, "--agent", "nobody"), "'nobody'"),
         (("--demonstrations", CART, "--env", "Nowhere-v9"), "Nowhere-v9"),
+        (("--demonstrations", CART, "--slides", "report.html"), "both name report.html"),
         ((), "--demonstrations"),
     ],
 )

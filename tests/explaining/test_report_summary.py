@@ -101,13 +101,19 @@ def test_what_a_person_sets_stands_on_the_first_page_as_text(cart: Demonstration
     assert 'src="data:image/png;base64,' in page
 
 
+def test_a_title_of_blanks_is_none(cart: Demonstrations) -> None:
+    assert "<h1>Rules for" in first_page(reported(cart, cover=Cover(title="  ")))
+
+
 @pytest.mark.parametrize(
     ("settings", "sentence"),
     [
         ({"title": "x" * 10_000}, "the title of a report has 10,000 characters"),
         ({"notes": "x" * 401}, "the notes of a report have"),
         ({"signers": ("a",) * 5}, "5 people are to sign"),
+        ({"notes": "a\n" * 9}, "the notes of a report have 9 lines; give at most 8"),
         ({"author": 3}, "must be text"),
+        ({"title": "a\udcffb"}, "is none in UTF-8"),
     ],
 )
 def test_what_does_not_fit_on_a_page_is_refused(settings: dict[str, object], sentence: str) -> None:

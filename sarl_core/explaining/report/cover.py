@@ -13,6 +13,7 @@ from sarl_core.limits import limited_bytes
 MOST_TITLE = 120
 MOST_LINE = 120
 MOST_NOTES = 400
+MOST_PARAGRAPHS = 8
 MOST_SIGNERS = 4
 _MOST_BYTES = 4 * 2**20
 _MOST_PIXELS = 16_000_000
@@ -32,6 +33,10 @@ class Logo:
     source: str
     width: int
     height: int
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,7 @@ class Cover:
         """Refuse what does not fit on one page.
 
         Raises:
-            InputError: If a text is too long or no text, or too many sign.
+            InputError: If a text is too long or no text, has too many lines, or too many sign.
         """
         for name, text, most in (
             ("the title", self.title, MOST_TITLE),
@@ -68,12 +73,22 @@ class Cover:
             *(("a signer", signer, MOST_LINE) for signer in self.signers),
         ):
             require(text, str, f"{name} of a report must be text", "give one")
+            if not text.isascii() and any("\ud800" <= sign <= "\udfff" for sign in text):
+                raise InputError(
+                    f"{name} of a report must be text, and {quoted(text)} is none in UTF-8; write "
+                    "it anew"
+                )
             if len(text) > most:
                 raise InputError(
                     f"{name} of a report {'have' if name.endswith('notes') else 'has'} "
                     f"{len(text):,} characters; give at most {most}, so that the first page holds "
                     "it"
                 )
+        if len(self.paragraphs) > MOST_PARAGRAPHS:
+            raise InputError(
+                f"the notes of a report have {len(self.paragraphs)} lines; give at most "
+                f"{MOST_PARAGRAPHS}, so that the first page holds them"
+            )
         if len(self.signers) > MOST_SIGNERS:
             raise InputError(
                 f"{len(self.signers)} people are to sign the report; name at most {MOST_SIGNERS}"
@@ -151,7 +166,3 @@ def logo_of(content: bytes, name: str) -> Logo:
     drawn.save(file, format="PNG")
     source = base64.b64encode(file.getvalue()).decode("ascii")
     return Logo(f"data:image/png;base64,{source}", drawn.width, drawn.height)
-
-
-def _line(text: str) -> str:
-    return " ".join(text.split())

@@ -256,7 +256,7 @@ def make_report(
     elsewhere = _elsewhere(as_given, demonstrations, trees)
     plain_title = f"Rules for {task_name(about)}" if about else "Rules from demonstrations"
     parts: dict[str, Any] = {
-        "title": wishes.cover.title or plain_title,
+        "title": wishes.cover.title.strip() or plain_title,
         "cover": wishes.cover,
         "summary": summary_part(
             rule_set,
