@@ -54,6 +54,16 @@ def test_the_first_page_says_what_the_rules_do_to_whom(cart: Demonstrations) -> 
     assert "What to decide" in page
 
 
+def test_intervals_are_announced_only_where_there_are_some(cart: Demonstrations) -> None:
+    _, shielded, *_ = read_results(CSV)
+    bare = dataclasses.replace(
+        shielded, episodes=1, gained=None, crashes=None, crash_ends=None, effect=""
+    )
+    page = first_page(reported(cart, comparison=[bare]))
+    assert "rests on 1 episode of an agent. Of what the rules change there is no interval" in page
+    assert "Its 95 % intervals:" not in page
+
+
 def test_without_a_comparison_the_first_page_says_how_to_get_one(cart: Demonstrations) -> None:
     page = first_page(reported(cart))
     assert "Nothing was measured for this report" in page

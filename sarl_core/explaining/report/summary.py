@@ -286,17 +286,26 @@ def _certainty(pairs: Sequence[Pair]) -> Iterator[str]:
         return
     numbers = sorted({pair.shielded.episodes for pair in pairs})
     episodes = " or ".join(f"{number:,}" for number in numbers)
-    yield f"Each number rests on {episodes} episodes of an agent. Its 95 % intervals:"
-    for pair in pairs[:MOST_PAIRS]:
-        one, facts = pair.shielded, []
-        if one.gained is not None:
-            ends = [telling_text(end) for end in (one.gained.low, one.gained.high)]
-            facts.append(f"the difference in mean return is {ends[0]} to {ends[1]}")
-        if is_known(one) and one.crash_ends is not None:
-            low, high = map(share_text, one.crash_ends)
-            facts.append(f"failures with the rules are {low} to {high}")
-        if facts:
-            yield f"{one.name}: {', '.join(facts)}."
+    noun = "episode" if numbers == [1] else "episodes"
+    rests = f"Each number rests on {episodes} {noun} of an agent."
+    intervals = [text for pair in pairs[:MOST_PAIRS] if (text := _intervals(pair))]
+    if not intervals:
+        yield f"{rests} Of what the rules change there is no interval."
+        return
+    yield f"{rests} Its 95 % intervals:"
+    yield from intervals
+
+
+def _intervals(pair: Pair) -> str:
+    """Between which ends lies what the rules did to one agent; "" where no end is known."""
+    one, facts = pair.shielded, []
+    if one.gained is not None:
+        ends = [telling_text(end) for end in (one.gained.low, one.gained.high)]
+        facts.append(f"the difference in mean return is {ends[0]} to {ends[1]}")
+    if is_known(one) and one.crash_ends is not None:
+        low, high = map(share_text, one.crash_ends)
+        facts.append(f"failures with the rules are {low} to {high}")
+    return f"{one.name}: {', '.join(facts)}." if facts else ""
 
 
 def _uncovered(counts: Tally, gaps: UncoveredSummary) -> tuple[str, ...]:
