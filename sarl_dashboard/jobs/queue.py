@@ -166,9 +166,10 @@ def _obstacle(
     before = _before(job, waiting, running, limits)
     ahead = f"{counted(before, 'job')} before this one; " if before else ""
     if len(running) >= limits.jobs:
+        go_on = "goes on" if len(running) == 1 else "go on"
         return _sentence(
-            f"{ahead}{counted(len(running), 'job')} run ({_whose(running, job)}), as many as this "
-            "server takes",
+            f"{ahead}{counted(len(running), 'job')} {go_on} ({_whose(running, job)}), as many as "
+            "this server takes",
             running,
         )
     if job.kind is not None and _is_full(job, running):

@@ -54,7 +54,13 @@ def test_who_is_at_the_limit_of_all_is_told_ones_place_and_by_whom() -> None:
     queue = JobQueue()
     begun(queue, work("Ada"), work("Ada"), work("Bob"))
     *_, said = begun(queue, work("Cy"), work("Bob"), work("Dot"))
-    assert "1 job before this one; 3 jobs run (2 of Ada, 1 of Bob), as many as" in said
+    assert "1 job before this one; 3 jobs go on (2 of Ada, 1 of Bob), as many as" in said
+
+
+def test_of_a_server_that_takes_one_job_one_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(VARIABLE, ServerLimits(jobs=1, jobs_each=1).to_text())
+    *_, said = begun(JobQueue(), work("Ada"), work("Bob"))
+    assert said == "Waiting: 1 job goes on (1 of Ada), as many as this server takes"
 
 
 def test_visitors_of_one_author_are_others_to_each_other() -> None:
