@@ -359,7 +359,7 @@ def require_demands(rule_set: RuleSet, what: str) -> None:
     if rule_set.forbids:
         raise InputError(
             f"{what} understands rules that demand an action, and some of these forbid one; choose "
-            "rules that were mined without --never"
+            "rules that demand"
         )
 
 

@@ -82,6 +82,14 @@ def test_a_replay_says_at_each_step_what_is_left(mined: RuleSet) -> None:
 def test_comparing_understands_demands_alone(mined: RuleSet) -> None:
     (error,) = errors(opened("difference", mined))
     assert error.startswith("The comparison of two rule sets understands rules that demand")
+    assert "on the page Thresholds" in error
+    assert "--never" not in error
+
+
+def test_the_report_is_offered_for_rules_that_forbid(mined: RuleSet) -> None:
+    app = opened("report", mined)
+    assert not errors(app)
+    assert [one.label for one in app.button if "report" in one.label.lower()]
 
 
 def test_what_each_rule_is_worth_is_found_out(mined: RuleSet) -> None:

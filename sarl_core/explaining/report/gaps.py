@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import extend
 from sarl_core.explaining.report.demonstrations import ActionShares, action_shares
+from sarl_core.explaining.report.rule_cards import least_share
 from sarl_core.explaining.report.svg import NEUTRAL, share_bar
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.evidence import FEWEST_EPISODES
@@ -118,7 +119,7 @@ def gaps(
         coverage=tuple(
             _coverage(rule_set, tally, dimension) for dimension in range(len(rule_set.actions))
         ),
-        contradictions=_contradictions(demonstrations, rule_set.divider),
+        contradictions=_contradictions(demonstrations, rule_set),
         doubts=_doubts(rule_set, demonstrations, tally),
         beyond=tuple(
             _beyond(one, rule_set, demonstrations, boxed=boxed)
@@ -143,12 +144,12 @@ def _coverage(rule_set: RuleSet, tally: Tally, dimension: int) -> Coverage:
     )
 
 
-def _contradictions(demonstrations: Demonstrations, divider: int) -> str:
+def _contradictions(demonstrations: Demonstrations, rule_set: RuleSet) -> str:
     if demonstrations.sample_of is not None:
         return ""
     if len(demonstrations) > _MOST_COMPARED or demonstrations.n_episodes < 2:
         return ""
-    contradictions = find_contradictions(demonstrations, divider=divider)
+    contradictions = find_contradictions(demonstrations, divider=rule_set.divider)
     count = int(contradictions.contradicting().sum())
     if not count:
         return (
@@ -156,11 +157,13 @@ def _contradictions(demonstrations: Demonstrations, divider: int) -> str:
             "another episode, it did the same."
         )
     share = share_text(count / len(demonstrations))
+    # A rule that forbids a third action is right in both.
+    one_right = "" if rule_set.forbids else "A rule can be right in only one of them. "
     return (
         f"In {count:,} of {counted(len(demonstrations), 'state')} ({share}) it did something else "
         "in the same state, or in the nearest one of another episode, no feature of which differs "
-        f"by more than {NEAR:g} of its standard deviation. A rule can be right in only one of "
-        "them. Where the expert changes its mind within a short way, this need be no mistake."
+        f"by more than {NEAR:g} of its standard deviation. "
+        f"{one_right}Where the expert changes its mind within a short way, this need be no mistake."
     )
 
 
@@ -176,7 +179,7 @@ def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> 
             text = f"1 rule {one}" if len(chosen) == 1 else f"{len(chosen):,} rules {many}"
             doubts.append(Doubt(text, tuple(named[:_MOST_NAMED]), max(len(named) - _MOST_NAMED, 0)))
 
-    few = [index for index, rule in rules if rule.origin == "mined" and rule.samples < FEW_STATES]
+    few = [index for index, rule in rules if rule.origin != "manual" and rule.samples < FEW_STATES]
     doubt(
         few,
         f"rests on fewer than {FEW_STATES} states: it may be chance.",
@@ -196,14 +199,16 @@ def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> 
             f"have their states in {lie}: they may know those and no others.",
         )
     if rule_set.cut == "thresholds":
-        needed = rule_set.thresholds.confidence
-        wanted = share_text(needed)
-        failed = [index for index, rule in rules if verdict(rule, needed) == "below"]
-        doubt(
-            failed,
-            f"does not reach {wanted} in the episodes kept aside.",
-            f"do not reach {wanted} in the episodes kept aside.",
-        )
+        for kind in ("do", "never"):
+            own = [(index, rule) for index, rule in rules if rule.kind == kind]
+            needed = least_share(own[0][1], rule_set) if own else None
+            if needed is None:
+                continue
+            doubt(
+                [index for index, rule in own if verdict(rule, needed) == "below"],
+                f"does not reach {share_text(needed)} in the episodes kept aside.",
+                f"do not reach {share_text(needed)} in the episodes kept aside.",
+            )
     else:
         minority = [index for index, rule in rules if 2 * rule.correct < rule.samples]
         doubt(

@@ -227,8 +227,16 @@ def commands_that_hold(
     return tuple(line for line in commands if not line.startswith(mining))
 
 
-def _mined(trees: Sequence[PolicyTree], rule_set: RuleSet) -> RuleSet:
-    """The rules of trees at the thresholds of others, and of the same kind."""
+def mined_alike(trees: Sequence[PolicyTree], rule_set: RuleSet) -> RuleSet:
+    """The rules of trees at the thresholds of others, and of the same kind.
+
+    Args:
+        trees: One an action dimension.
+        rule_set: Rules whose thresholds count, and whether they demand or forbid.
+
+    Returns:
+        The rules.
+    """
     limits = rule_set.thresholds
     if limits.never is not None and _forbids_alone(rule_set):
         return mine_never_rules(
@@ -260,7 +268,7 @@ def mined_again(rule_set: RuleSet, trees: Sequence[PolicyTree] | None) -> bool:
     """
     if not trees:
         return False
-    again = _mined(trees, rule_set)
+    again = mined_alike(trees, rule_set)
     one, other = (
         [
             (rule.id, rule.dimension, rule.conditions, rule.action, rule.forbids)

@@ -26,7 +26,12 @@ from sarl_core.explaining.report.cover import PLAIN, Cover
 from sarl_core.explaining.report.demonstrations import demonstrations_part
 from sarl_core.explaining.report.gaps import gaps
 from sarl_core.explaining.report.pdf import document_to_pdf
-from sarl_core.explaining.report.provenance import commands_that_hold, facts, mined_again
+from sarl_core.explaining.report.provenance import (
+    commands_that_hold,
+    facts,
+    mined_again,
+    mined_alike,
+)
 from sarl_core.explaining.report.rules import in_order, rules_part
 from sarl_core.explaining.report.slides import slides_document
 from sarl_core.explaining.report.summary import summary_part
@@ -42,7 +47,7 @@ from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.language import counted, merged_length, share_text
-from sarl_core.mining.rule_set import RuleSet, require_demands
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import cross_fit
 from sarl_core.progress import Progress
@@ -218,7 +223,6 @@ def make_report(
     """
     call = "call make_report(rules, demonstrations)"
     require(rule_set, RuleSet, "what a report is about must be a RuleSet", call)
-    require_demands(rule_set, "the report")
     require(cover, Cover, "the cover of a report must be a Cover", "make one: Cover(title=...)")
     must = "what a report shows the rules on must be Demonstrations"
     require(demonstrations, Demonstrations, must, call)
@@ -244,7 +248,8 @@ def make_report(
         rule_set = renamed_rules(rule_set, names_of(demonstrations))
     rule_set = with_splits(rule_set, demonstrations)
     counts = tally(rule_set, demonstrations)
-    if trees is None and rule_set.cut == "thresholds":
+    probed = any(rule.origin == "probed" for rule in rule_set.rules)
+    if trees is None and rule_set.cut == "thresholds" and not probed:
         trees = grow_policy_trees(
             demonstrations, divider=rule_set.divider, learner=rule_set.learner
         )
@@ -253,11 +258,12 @@ def make_report(
     examples, without = _examples(rule_set, demonstrations, order[0], wishes, progress)
     about = demonstrations.env_id or rule_set.source.env_id
     uncovered = gaps(rule_set, demonstrations, counts, examples)
-    elsewhere = _elsewhere(as_given, demonstrations, trees)
+    elsewhere = _elsewhere(as_given, demonstrations, trees, counts)
     plain_title = f"Rules for {task_name(about)}" if about else "Rules from demonstrations"
     parts: dict[str, Any] = {
         "title": wishes.cover.title.strip() or plain_title,
         "cover": wishes.cover,
+        "forbids": rule_set.forbids,
         "summary": summary_part(
             rule_set,
             demonstrations,
@@ -404,6 +410,13 @@ def _key_numbers(rule_set: RuleSet, counts: Tally) -> tuple[tuple[str, str], ...
     features = rule_set.source.features
     merged = sum(merged_length(rule, features) for rule in rules) / max(len(rules), 1)
     coverage, right, states = counts.coverage, followed.value, "the demonstrated states"
+    if counts.leeway is not None:
+        return (
+            (f"{len(rules):,}", "rule" if len(rules) == 1 else "rules"),
+            (share_text(coverage), f"of {states} have a rule"),
+            (share_text(right), "of these are as the rules say"),
+            (share_text(counts.leeway.freedom), "of the choice is left (freedom)"),
+        )
     if counts.sampled and is_plain(rule_set.rules):
         coverage, right = rule_set.coverage, rule_set.fidelity
     elif counts.sampled:
@@ -417,7 +430,10 @@ def _key_numbers(rule_set: RuleSet, counts: Tally) -> tuple[tuple[str, str], ...
 
 
 def _elsewhere(
-    rule_set: RuleSet, demonstrations: Demonstrations, trees: Sequence[PolicyTree] | None
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+    trees: Sequence[PolicyTree] | None,
+    counts: Tally,
 ) -> tuple[str, str]:
     """What the rules are worth where they were not mined, and a warning; "" where not known."""
     if demonstrations.sample_of is not None:
@@ -427,5 +443,9 @@ def _elsewhere(
     divider = rule_set.divider
     combined = pairs_chosen_from(demonstrations, divider=divider)
     fit = cross_fit(demonstrations, divider=divider, combined=combined, learner=rule_set.learner)
-    judged = fit.at(rule_set.thresholds)
-    return judged_sentence(judged), parting_text(rule_set.fidelity, judged)
+    if counts.leeway is None:
+        judged, fidelity = fit.at(rule_set.thresholds), rule_set.fidelity
+    else:
+        judged = fit.of(lambda of_fold: mined_alike(of_fold, rule_set))
+        fidelity = counts.leeway.fidelity
+    return judged_sentence(judged), parting_text(fidelity, judged)

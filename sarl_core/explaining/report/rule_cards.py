@@ -46,6 +46,7 @@ class Evidence:
     """How often the expert did what a rule says.
 
     Attributes:
+        did: As "The expert did so in".
         source: Of which states, as "that the rule was made from".
         text: As "412 of 425 states (97 %)".
         interval: What other episodes can tell, in words; "" of those that the rule was made from.
@@ -53,6 +54,7 @@ class Evidence:
         below: Whether the interval lies below the threshold.
     """
 
+    did: str
     source: str
     text: str
     interval: str
@@ -152,6 +154,8 @@ def rule_card(
     # Where several rules apply, or this one is off, it applies to more states than it decides.
     rows = np.flatnonzero(rule.applies(demonstrations.observations))
     applying, decided = len(rows), len(tally.rows(index, rule.dimension))
+    if rule.forbids and rule.enabled:  # what one forbids, no other one that forbids allows
+        decided = applying
     return Card(
         name=rule_set.name_of(rule),
         title=sentence(rule, rule_set, evidence=False),
@@ -204,8 +208,9 @@ def _support(rule: Rule, applying: int, decided: int, tally: Tally) -> str:
         )
     text = f"Applies in {share_text(applying / len(tally.rules))} of this report's states "
     text += f"({applying:,})"
-    if rule.origin == "mined" and rule.samples:
-        text += f", and in {share_text(rule.support)} of those it was made from"
+    if rule.origin != "manual" and rule.samples:
+        made = "probed ones" if rule.origin == "probed" else "those"
+        text += f", and in {share_text(rule.support)} of {made} it was made from"
     if decided != applying:
         text += f"; it decides {number} of this report's"
     return f"{text}."
@@ -214,19 +219,40 @@ def _support(rule: Rule, applying: int, decided: int, tally: Tally) -> str:
 def _evidence(
     rule: Rule, rule_set: RuleSet, index: int, tally: Tally, applying: int
 ) -> tuple[Evidence, ...]:
-    threshold = rule_set.thresholds.confidence if rule_set.cut == "thresholds" else None
+    threshold = least_share(rule, rule_set)
+    did = "The expert did not in" if rule.forbids else "The expert did so in"
     evidence = []
-    if rule.origin == "mined":
-        evidence.append(_mined(Share(rule.correct, rule.samples), threshold))
+    if rule.origin != "manual":
+        failed = "After it the expert failed in" if rule.origin == "probed" else did
+        evidence.append(_mined(failed, Share(rule.correct, rule.samples), threshold))
     if rule.held_out is not None:
         source = "of episodes kept aside, which it was not made from"
-        evidence.append(_tried(source, rule.held_out, threshold))
+        evidence.append(_tried(did, source, rule.held_out, threshold))
     if not (tally.same or tally.split) or rule.origin != "mined":
         here = tally.by_episode[index]
         decided = "that it decides " if here.samples != applying else ""
         states = "the sample" if tally.sampled else "this report's demonstrations"
-        evidence.append(_tried(f"{decided}of {states}", here, threshold))
+        at_least = None if rule.origin == "probed" else threshold
+        evidence.append(_tried(did, f"{decided}of {states}", here, at_least))
     return tuple(evidence)
+
+
+def least_share(rule: Rule, rule_set: RuleSet) -> float | None:
+    """What its share in the states that a rule was made from had to reach.
+
+    Args:
+        rule: One of the set.
+        rule_set: The rules.
+
+    Returns:
+        None where no thresholds cut the rules.
+    """
+    limits = rule_set.thresholds
+    if rule_set.cut != "thresholds":
+        return None
+    if rule.forbids and limits.never is not None:
+        return 1.0 - limits.never
+    return limits.confidence
 
 
 def _states(share: Share) -> str:
@@ -234,22 +260,22 @@ def _states(share: Share) -> str:
     return f"{share.part:,} of {states} ({share_text(share.value)})"
 
 
-def _nothing(source: str) -> Evidence:
-    return Evidence(source, "0 of 0 states", "nothing is known there", Markup(), below=False)
+def _nothing(did: str, source: str) -> Evidence:
+    return Evidence(did, source, "0 of 0 states", "nothing is known there", Markup(), below=False)
 
 
-def _mined(share: Share, threshold: float | None) -> Evidence:
+def _mined(did: str, share: Share, threshold: float | None) -> Evidence:
     """No interval: a rule was chosen for being right there."""
     source = "that the rule was made from"
     if not share.whole:
-        return _nothing(source)
+        return _nothing(did, source)
     bar = evidence_bar(share.value, None, below=False, threshold=threshold)
-    return Evidence(source, _states(share), "", bar, below=False)
+    return Evidence(did, source, _states(share), "", bar, below=False)
 
 
-def _tried(source: str, held_out: HeldOut, threshold: float | None) -> Evidence:
+def _tried(did: str, source: str, held_out: HeldOut, threshold: float | None) -> Evidence:
     if not held_out.samples:
-        return _nothing(source)
+        return _nothing(did, source)
     interval = held_out.interval
     below = threshold is not None and interval is not None and interval.high < threshold
     if held_out.share is None:  # an older file counted states alone
@@ -265,6 +291,7 @@ def _tried(source: str, held_out: HeldOut, threshold: float | None) -> Evidence:
             "these are too few to say more" if interval is None else what_tells(interval)
         )
     return Evidence(
+        did=did,
         source=source,
         text=_states(Share(held_out.correct, held_out.samples)),
         interval=f"{interval_text}{', below the threshold' if below else ''}",
@@ -321,7 +348,7 @@ def _picture(
     state = extended_state(frame.observation.tolist(), features)
     value = frame.executed[rule.dimension].item()
     did = done_text(value, dimension)
-    followed = dimension.label_of(value) == rule.action
+    followed = bool(rule.obeyed_by(np.array([dimension.label_of(value)])).all())
     name = frame.player[:1].upper() + frame.player[1:]
     return Picture(
         source=f"data:image/png;base64,{base64.b64encode(frame.picture).decode('ascii')}",

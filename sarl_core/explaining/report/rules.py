@@ -32,7 +32,7 @@ class RuleLine:
         when: Its conditions, in signs.
         support: Share of the states to which it applies.
         samples: Number of those.
-        confidence: Share of those with its action.
+        confidence: Share of those with its action; of rules that forbid, in words.
         tags: As "switched off".
     """
 
@@ -65,6 +65,8 @@ class Rules:
 
     Attributes:
         introduction: What is shown how, in sentences.
+        beneath: What stands under each rule, as a sentence.
+        headings: Of the columns for what a rule says and what the expert did.
         groups: Rules in full, by action dimension.
         lines: The others.
         printed: How many of those are printed.
@@ -72,6 +74,8 @@ class Rules:
     """
 
     introduction: tuple[str, ...]
+    beneath: str
+    headings: tuple[str, str]
     groups: tuple[Group, ...]
     lines: tuple[RuleLine, ...]
     printed: int
@@ -144,11 +148,29 @@ def rules_part(
             *_introduction(rule_set, tally, len(full), len(rest)),
             *_on_combinations(rule_set, full),
         ),
+        beneath=_beneath(rule_set),
+        headings=("What it says", "Expert") if rule_set.forbids else ("Do", "Expert did so"),
         groups=tuple(groups),
         lines=lines,
         printed=_PRINTED_LINES,
         left_out=max(len(rest) - MOST_IN_TABLE, 0),
     )
+
+
+def _beneath(rule_set: RuleSet) -> str:
+    kinds = {(rule.kind, rule.origin == "probed") for rule in rule_set.rules}
+    texts = {
+        ("do", False): "the expert did what it says",
+        ("never", False): "the expert did not do what it forbids",
+        ("never", True): "the expert failed after what it forbids, when that was tried",
+    }
+    clauses = [text for kind, text in texts.items() if kind in kinds]
+    here = (
+        " And in how many of this report's states the expert did not do it."
+        if ("never", True) in kinds
+        else ""
+    )
+    return f"Under each rule: in how many of its states {', or '.join(clauses)}.{here}"
 
 
 def _on_combinations(rule_set: RuleSet, full: Sequence[int]) -> tuple[str, ...]:
@@ -177,7 +199,7 @@ def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tupl
             "There is no rule: no part of the tree reaches the thresholds. Such a shield leaves "
             "every action as it is.",
         )
-    only_one = not any(rule.placed for rule in rule_set.rules)
+    only_one = not any(rule.placed for rule in rule_set.rules) and not rule_set.forbids
     applying = (
         "In a state at most one rule for each action applies; where none does, the agent acts as "
         "it likes."
@@ -185,6 +207,15 @@ def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tupl
         else "Several may apply; the first, in this order, decides. Where none applies, the agent "
         "acts as it likes."
     )
+    if rule_set.forbids:
+        applying = (
+            "A rule that forbids takes an action away and leaves the others to the agent. Several "
+            "may apply: what any of them forbids is replaced by what the expert did most often "
+            "there of what none forbids. "
+        )
+        if any(not rule.forbids for rule in rule_set.rules):
+            applying += "Where a rule applies that says what to do, it decides. "
+        applying += "Where none applies, the agent acts as it likes."
     if any(not rule.enabled for rule in rule_set.rules):
         applying += " A rule that is switched off decides nothing."
     sentences = [f"Of several conditions in a rule all must hold. {applying}"]
@@ -198,6 +229,11 @@ def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tupl
         sentences.append(
             f"The rules were mined from {counted(rule_set.source.episodes, 'episode')} of these "
             "demonstrations; the others were kept aside to try the rules on."
+        )
+    elif any(rule.origin == "probed" for rule in rule_set.rules):
+        sentences.append(
+            f"The rules were made from probes of {counted(rule_set.source.steps, 'state')}, and "
+            "not from the demonstrations of this report; both counts are shown."
         )
     elif not tally.same:
         sentences.append(
@@ -216,6 +252,15 @@ def _line(rule_set: RuleSet, index: int) -> RuleLine:
         when=conditions_text(rule, rule_set),
         support=share_text(rule.support),
         samples=f"{rule.samples:,}",
-        confidence=share_text(rule.confidence) if rule.samples else "–",
+        confidence=_did(rule, rule_set) if rule.samples else "–",
         tags=tags(rule),
     )
+
+
+def _did(rule: Rule, rule_set: RuleSet) -> str:
+    share = share_text(rule.confidence)
+    if rule.origin == "probed":
+        return f"failed after it in {share}"
+    if rule_set.forbids:
+        return f"did {'not' if rule.forbids else 'so'} in {share}"
+    return share

@@ -19,6 +19,7 @@ from sarl_core.explaining.words.sign_off import SignOff
 from sarl_core.mining.language import at_least_text, counted, number_text, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rollouts.seeds import FRESH
+from sarl_core.shielding.leeway import Leeway
 
 MOST_PAIRS = 2  # as many fit on the first page; all stand in the comparison itself
 
@@ -160,6 +161,12 @@ def _demonstrated(
     who = f"The agent “{demonstrations.agent}”" if demonstrations.agent else "An expert"
     where = f" in {demonstrations.env_id}" if demonstrations.env_id else ""
     rules = counted(sum(rule.enabled for rule in rule_set.rules), "rule")
+    acted = (
+        f"{who} acted{where} for {counted(whole.steps, 'step')} in "
+        f"{counted(whole.episodes, 'episode')}."
+    )
+    if counts.leeway is not None:
+        return tuple(_demonstrated_forbidding(rule_set, acted, counts, counts.leeway))
     followed = counts.followed
     share = (
         f", and it did what the rule says in {share_text(followed.value)} of these"
@@ -167,9 +174,47 @@ def _demonstrated(
         else ""
     )
     return (
-        f"{who} acted{where} for {counted(whole.steps, 'step')} in "
-        f"{counted(whole.episodes, 'episode')}. From what it did came {rules} in plain language. "
+        f"{acted} From what it did came {rules} in plain language. "
         f"A rule applies in {share_text(counts.coverage)} of the states{share}.",
+    )
+
+
+def _demonstrated_forbidding(
+    rule_set: RuleSet, acted: str, counts: Tally, leeway: Leeway
+) -> Iterator[str]:
+    """What was shown where rules forbid, and what they leave."""
+    rules = [rule for rule in rule_set.rules if rule.enabled]
+    forbidding = sum(bool(rule.forbids) for rule in rules)
+    probed = any(rule.origin == "probed" for rule in rules)
+    which = (
+        f"{counted(len(rules), 'rule')} in plain language"
+        if forbidding == len(rules)
+        else f"{counted(len(rules), 'rule')} in plain language, of which {forbidding:,} forbid"
+    )
+    origin = (
+        f"{which} come from probes: in states that an agent came to each action was tried, and the "
+        "expert went on from there"
+        if probed
+        else f"From what it did came {which}"
+    )
+    yield f"{acted} {origin[0].upper()}{origin[1:]}."
+    what = (
+        "The rules forbid: each says what not to do in some states, and leaves the rest to the "
+        "agent."
+        if forbidding == len(rules)
+        else "A rule that forbids says what not to do in some states, and leaves the rest to the "
+        "agent."
+    )
+    followed = counts.followed
+    share = (
+        f", and in {share_text(followed.value)} of these the expert did as they say"
+        if followed.whole
+        else ""
+    )
+    yield (
+        f"{what} One applies in {share_text(counts.coverage)} of the states{share}. "
+        f"{share_text(leeway.freedom)} of the choice is left in the demonstrated states (freedom: "
+        "100 % is all actions everywhere, 0 % a single one)."
     )
 
 
@@ -321,6 +366,11 @@ def _uncovered(counts: Tally, gaps: UncoveredSummary) -> tuple[str, ...]:
         "States that nobody demonstrated, another task or other sensors are not covered; nothing "
         "here proves that following the rules avoids harm."
     )
+    if counts.leeway is not None:
+        sentences.append(
+            "What the expert was not shown to do is not unsafe for that, and what no rule forbids "
+            "is not safe for that."
+        )
     if gaps.doubts:
         sentences.append(gaps.doubts[0].text)
     if len(gaps.doubts) > 1:

@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
+from sarl_core.mining.applications import applications
 from sarl_core.mining.edit_counts import is_plain
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.rule_order import Fitted, rules_for
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rule_set import RuleSet, obeying_labels
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.episode_counts import count_applied
+from sarl_core.shielding.leeway import Leeway, leeway_of
 from sarl_core.shielding.shield import Shield
 
 
@@ -47,8 +49,10 @@ class Tally:
         split: Whether they were mined from some of these episodes and tried on all the others.
         rules: Index of the rule in force or -1, (N, m) int64.
         labels: What the expert did, (N, m) int64.
-        shares: Of each rule, in how many of its states the expert did what it says.
+        shares: Of each rule, in how many of its states the expert did what it says, or did not
+            what it forbids.
         by_episode: The same of each rule, counted by episodes.
+        leeway: What rules leave, where some of them forbid; None where all demand.
     """
 
     same: bool
@@ -58,6 +62,7 @@ class Tally:
     labels: NDArray[np.int64]
     shares: tuple[Share, ...]
     by_episode: tuple[HeldOut, ...]
+    leeway: Leeway | None = None
 
     def covered(self, dimension: int) -> Share:
         """In how many states a rule of a dimension applies."""
@@ -75,8 +80,11 @@ class Tally:
 
     @property
     def followed(self) -> Share:
-        """In how many of the covered states the expert did what the rule says."""
-        return Share(sum(share.part for share in self.shares), int((self.rules >= 0).sum()))
+        """In how many of the covered states the expert did as the rules say."""
+        whole = int((self.rules >= 0).sum())
+        if self.leeway is not None:  # rules that forbid overlap: their states do not add up
+            return Share(round(self.leeway.fidelity * whole) if whole else 0, whole)
+        return Share(sum(share.part for share in self.shares), whole)
 
 
 def report_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Fitted:
@@ -124,7 +132,8 @@ def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
         demonstrations: N pairs of the same features and actions.
 
     Returns:
-        The counts; a state belongs to the rule a shield would find for it.
+        The counts; a state belongs to the rule a shield would find for it, and to all rules that
+        forbid something there.
 
     Raises:
         InputError: If features or actions differ.
@@ -135,14 +144,13 @@ def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
     labels = np.stack(
         [one.labels_of(actions[:, index]) for index, one in enumerate(rule_set.actions)], axis=1
     )
-    rule_labels = np.array([rule.action for rule in rule_set.rules] or [0], dtype=np.int64)
-    inside = in_force >= 0
-    right = inside & (rule_labels[np.maximum(in_force, 0)] == labels)
     count = len(rule_set.rules)
-    row, _ = np.nonzero(inside)
-    by_episode = count_applied(
-        count, in_force[inside], row, right[inside], demonstrations
-    ).held_out()
+    row, dimension = np.nonzero(in_force >= 0)
+    rule = in_force[row, dimension]
+    if rule_set.forbids:
+        rule, row, dimension = _with_forbidding(rule, row, dimension, rule_set, demonstrations)
+    right = obeying_labels(rule_set)[rule, labels[row, dimension]]
+    by_episode = count_applied(count, rule, row, right, demonstrations).held_out()
     shares = tuple(Share(one.correct, one.samples) for one in by_episode)
     same = rule_set.source.digest == demonstrations.whole.digest
     return Tally(
@@ -153,6 +161,28 @@ def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
         labels=labels,
         shares=shares,
         by_episode=tuple(by_episode),
+        leeway=leeway_of(rule_set, demonstrations) if rule_set.forbids else None,
+    )
+
+
+def _with_forbidding(
+    rule: NDArray[np.int64],
+    row: NDArray[np.int64],
+    dimension: NDArray[np.int64],
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Give each rule that forbids all states to which it applies, and not one of several."""
+    forbids = np.array([bool(one.forbids) for one in rule_set.rules])
+    usable = forbids & np.array([one.enabled for one in rule_set.rules])
+    of_rule = np.array([one.dimension for one in rule_set.rules])
+    applied = applications(rule_set, demonstrations.observations)
+    more, demands = usable[applied.rule], ~forbids[rule]
+    subject = applied.rule[more]
+    return (
+        np.concatenate([rule[demands], subject]),
+        np.concatenate([row[demands], applied.row[more]]),
+        np.concatenate([dimension[demands], of_rule[subject]]),
     )
 
 
@@ -174,5 +204,5 @@ def _wherever_it_applies(rule: Rule, rule_set: RuleSet, demonstrations: Demonstr
     """How a rule fares in all states to which it applies, also where another one decides."""
     holds = rule.applies(demonstrations.observations)
     values = demonstrations.action_columns[holds, rule.dimension]
-    right = rule_set.actions[rule.dimension].labels_of(values) == rule.action
-    return Share(int(right.sum()), int(holds.sum()))
+    labels = rule_set.actions[rule.dimension].labels_of(values)
+    return Share(int(rule.obeyed_by(labels).sum()), int(holds.sum()))

@@ -199,9 +199,11 @@ def thresholds_part(
         The part of the report.
     """
     entries = fitting(card, _RuleSetCard)
-    facts = tuple(_card_facts(entries))
+    facts = tuple(_card_facts(entries, forbids=rule_set.forbids))
     edits = edits_sentence(rule_set)
     then = (edits,) if edits else ()
+    if rule_set.forbids:
+        return ThresholdsPart((*_forbidding(rule_set), *then), None, "", (), facts)
     if rule_set.cut == "leaves" or trees is None:
         return ThresholdsPart((*_built(rule_set, entries), *then), None, "", (), facts)
     limits = rule_set.thresholds
@@ -259,6 +261,36 @@ def _cut(rule_set: RuleSet) -> tuple[str, ...]:
             f"Each continuous action was divided into {rule_set.divider} equal intervals, and a "
             "rule names one of them."
         )
+    return tuple(sentences)
+
+
+def _forbidding(rule_set: RuleSet) -> tuple[str, ...]:
+    """How rules came about of which some forbid."""
+    limits = rule_set.thresholds
+    sentences: list[str] = []
+    if any(not rule.forbids for rule in rule_set.rules):
+        sentences += _cut(rule_set)
+    if any(rule.origin == "probed" for rule in rule_set.rules):
+        sentences.append(
+            "Rules that forbid follow from probes here: in states that an agent came to, each "
+            "action was tried, and the expert went on from there. A leaf of a decision tree over "
+            "the outcomes forbids an action where the expert failed after it in more than "
+            f"{share_text(limits.confidence)} of the states, and never what the expert does most "
+            "often there."
+        )
+    elif limits.never is not None:
+        sentences.append(
+            "Rules that forbid come from a decision tree: conditions on the state, tried one after "
+            "the other. A rule was kept if it applies to at least "
+            f"{share_text(limits.support)} of the {counted(rule_set.source.steps, 'state')} (its "
+            "support), and if the expert did what it forbids in at most "
+            f"{share_text(limits.never)} of those (epsilon), counted by the upper bound of what so "
+            "few or so many states can tell."
+        )
+    sentences.append(
+        "How many rules other thresholds would give is not drawn here: that picture is about rules "
+        "that demand an action."
+    )
     return tuple(sentences)
 
 
@@ -369,13 +401,15 @@ def _built(rule_set: RuleSet, card: _RuleSetCard) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _card_facts(card: _RuleSetCard) -> Iterator[tuple[str, str]]:
+def _card_facts(card: _RuleSetCard, *, forbids: bool) -> Iterator[tuple[str, str]]:
     """What a card says."""
+    agent = "an agent under the rules" if forbids else "an agent that follows the rules"
     if card.budget is not None:
         yield "Most rules for each action", number_text(card.budget)
     if card.rounds:
         choice = _with(", of which the rules of round {} were taken", card.chosen_round)
-        yield "Rounds of asking the expert", f"{len(card.rounds)}{choice}"
+        rounds = "Rounds of probes" if forbids else "Rounds of asking the expert"
+        yield rounds, f"{len(card.rounds)}{choice}"
     if card.refined is not None:
         yield "Thresholds moved to achieve more", "yes" if card.refined else "no"
     if card.chosen_by is not None:
@@ -383,7 +417,7 @@ def _card_facts(card: _RuleSetCard) -> Iterator[tuple[str, str]]:
     reported = fitting(card.reported, _Reported)
     if reported.mean is not None:
         yield (
-            "Mean return of an agent that follows the rules",
+            f"Mean return of {agent}",
             number_text(reported.mean)
             + _with(" ± {}", reported.std)
             + _with(", from {} to {}", reported.min, reported.max)
@@ -391,13 +425,13 @@ def _card_facts(card: _RuleSetCard) -> Iterator[tuple[str, str]]:
         )
     rate = reported.rate
     if rate is not None:
-        yield "Failures of an agent that follows the rules", rate_text(rate)
+        yield f"Failures of {agent}", rate_text(rate)
     if reported.worst_tenth is not None:
         yield "Mean return of the worst tenth of them", number_text(reported.worst_tenth)
     cost = _with("{} an episode", reported.cost)
     if cost and not (rate and reported.cost == rate.rate):
         between = _with(" (95 % interval {} to {})", reported.cost_low, reported.cost_high)
-        yield "Cost of an agent that follows the rules", cost + between
+        yield f"Cost of {agent}", cost + between
     if card.reported_on is not None:
         yield "Reported on", card.reported_on
     if card.seed is not None:

@@ -10,7 +10,7 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import SarlError
+from sarl_core.errors import InputError, SarlError
 from sarl_core.explaining.html.confusion import confusion_html
 from sarl_core.explaining.tables.difference import KINDS, example_rows, rule_rows
 from sarl_core.explaining.words.difference import decided_text, rows_text
@@ -77,6 +77,12 @@ def comparison() -> None:
         st.info("Choose at least two rule sets to compare.", icon=":material/compare_arrows:")
         return
     try:
+        if any(side.rule_set.forbids for side in sides):
+            raise InputError(
+                "the comparison of two rule sets understands rules that demand an action, and some "
+                "of these forbid one; choose rules that demand, on the page Thresholds, or other "
+                "rules above"
+            )
         show_overview(sides, _different)
         compared = _compare(*_pair(sides))
         if compared.demonstrations is not None:

@@ -13,7 +13,6 @@ from sarl_core.errors import InputError
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.mining.combining.candidates import Pair
-from sarl_core.mining.rule_set import require_demands
 from sarl_core.mining.rules import Thresholds
 from sarl_core.rollouts.choices import check_choice
 from sarl_core.rollouts.seeds import FRESH
@@ -121,7 +120,11 @@ def gaps_order(
     """Which states need a demonstration, at the thresholds in force."""
     trees = grown_trees(demonstrations, choices.divider)
     rules = mined_rules(trees, chosen_thresholds(), data_parts())
-    require_demands(rules, "finding gaps")
+    if rules.forbids:
+        raise InputError(
+            "finding gaps understands rules that demand an action, and those at the thresholds "
+            "forbid one; choose rules that demand on the page Thresholds"
+        )
     plan = Plan(
         MIN_RULES,
         rounds=1,

@@ -13,7 +13,7 @@ from sarl_core.explaining.report.report import Wishes
 from sarl_core.explaining.report.tally import report_rules
 from sarl_core.explaining.report.thresholds import read_card
 from sarl_core.library.items import PREFIX
-from sarl_core.mining.rule_set import RuleSet, require_demands
+from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.jobs.report import ReportOrder, as_results, comparison_of_session
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.data import (
@@ -58,7 +58,6 @@ def order_of(choices: ReportChoices, demonstrations: Demonstrations) -> ReportOr
     rule_set = rules_for(choices.rules)
     if rule_set is None:
         raise InputError("there are no rules to report; choose some")
-    require_demands(rule_set, "the report")
     # With what the rules derive; where they are of others, what is wrong is said.
     demonstrations = fitting_demonstrations(rule_set, demonstrations) or demonstrations
     report_rules(rule_set, demonstrations)
