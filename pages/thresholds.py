@@ -32,12 +32,9 @@ compact = chosen_compact(demonstrations)
 take_over()
 forbids = chosen_mode() == FORBID
 st.caption(
-    "A rule must apply to at least a certain share of the states (support), and "
-    + (
-        "the expert must have done what it forbids in at most a certain share of those (epsilon)."
-        if forbids
-        else "the expert must have done the same in at least a certain share of those (confidence)."
-    )
+    "A rule must apply to at least a certain share of the states (support), and the expert must "
+    "have done there what it demands often enough (confidence), or what it forbids seldom enough "
+    "(epsilon)."
 )
 mode_choice()
 without_edits_notice()

@@ -75,7 +75,7 @@ def test_every_agent_with_every_shield_is_what_the_library_gives() -> None:
         (told,) = (line for line in texts(app).splitlines() if f"return of the {agent} " in line)
         assert "the filtered rules" in told
         assert "the unfiltered rules" in told
-    assert len(app.get("plotly_chart")) == 2
+    assert len(app.get("plotly_chart")) == 3  # and failures against freedom
     assert [button.label for button in app.get("download_button")] == ["Download CSV"]
 
 

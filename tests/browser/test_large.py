@@ -48,11 +48,11 @@ def test_thousands_of_rules_are_turned_over_and_the_chosen_one_stays(
     # What stands above the table is there, so that it does not move any more.
     expect(screen.get_by_text(re.compile("judged by rules mined without it"))).to_be_visible()
     settle(screen)
-    sentence = screen.get_by_role("heading", level=4).first.inner_text()
+    sentence = screen.locator(".st-key-sentence").get_by_role("heading").first.inner_text()
     turn(screen, 2)
     expect(screen.get_by_text(re.compile(r"Rows 2,001 to "))).to_be_visible()
     assert parameters(screen)["rules_page"] == "2"
-    assert screen.get_by_role("heading", level=4).first.inner_text() == sentence
+    assert screen.locator(".st-key-sentence").get_by_role("heading").first.inner_text() == sentence
     # The link opens the same page.
     visit(screen, screen.url, "Rules")
     expect(screen.get_by_text(re.compile(r"Rows 2,001 to "))).to_be_visible()
@@ -61,7 +61,7 @@ def test_thousands_of_rules_are_turned_over_and_the_chosen_one_stays(
     settle(screen)
     expect(screen.get_by_text(re.compile(r"Rows 1 to 2,000\."))).to_be_visible()
     assert "rules_page" not in parameters(screen)
-    assert screen.get_by_role("heading", level=4).first.inner_text() != sentence
+    assert screen.locator(".st-key-sentence").get_by_role("heading").first.inner_text() != sentence
     screen.get_by_role("textbox", name="Search").fill("no such thing")
     screen.get_by_role("textbox", name="Search").press("Enter")
     expect(screen.get_by_text("No rule matches the search")).to_be_visible()

@@ -21,7 +21,7 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
     expect(screen.get_by_text("all done already")).to_be_visible(timeout=PATIENCE)
     settle(screen)
     expect(screen.get_by_text("the typical return of the novice rises")).to_be_visible()
-    expect(screen.locator(".js-plotly-plot")).to_have_count(2)
+    expect(screen.locator(".js-plotly-plot")).to_have_count(3)
     traces = screen.locator(".js-plotly-plot").nth(1).locator(".scatterlayer .trace")
     expect(traces).to_have_count(6)
     with screen.expect_download() as started:
