@@ -212,7 +212,7 @@ def _demonstrated_forbidding(
         else ""
     )
     yield (
-        f"{what} One applies in {share_text(counts.coverage)} of the states{share}. "
+        f"{what} A rule applies in {share_text(counts.coverage)} of the states{share}. "
         f"{share_text(leeway.freedom)} of the choice is left in the demonstrated states (freedom: "
         "100 % is all actions everywhere, 0 % a single one)."
     )
