@@ -134,15 +134,10 @@ def test_they_are_held_against_a_log(typed, tmp_path, options):
     assert len(pd.read_csv(folder / "rules.csv")) == len(rules)
 
 
-@pytest.mark.parametrize("command", ["report", "diff"])
-def test_where_they_are_not_understood_that_is_said(typed, tmp_path, command):
+def test_where_they_are_not_understood_that_is_said(typed, tmp_path):
     out = tmp_path / "never.json"
     assert typed("mine", CART, "--never", "0.1", "--out", str(out))[0] == 0
-    arguments = {
-        "report": (str(out), "--demonstrations", CART, "--out", str(tmp_path / "report.html")),
-        "diff": (str(out), str(out)),
-    }[command]
-    code, _, error = typed(command, *arguments)
+    code, _, error = typed("diff", str(out), str(out))
     assert code == 2
     assert "some of these forbid one" in error
 

@@ -90,7 +90,7 @@ def test_of_several_seeds_the_one_in_the_middle_is_shipped() -> None:
         assert card["seed"] == middle["seed"]
         assert card["command"] == middle["command"]
         assert card["reported"]["mean"] == pytest.approx(middle["mean"], abs=0.01)
-        assert card["reported"]["failures"] == middle["failures"]
+        assert card["reported"].get("failures") == middle["failures"]  # Pendulum has none
         assert max(card["rules_per_dimension"]) == middle["rules"]
 
 
