@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[1]
 CHROMIUM = "/usr/bin/chromium"
@@ -108,19 +108,26 @@ class Answer(NamedTuple):
 
 
 @contextlib.contextmanager
-def opened() -> Iterator[tuple[Page, str, Path]]:
-    """A window, the address of a dashboard that was just started, and a folder for files."""
+def served() -> Iterator[tuple[Browser, str, Path]]:
+    """A browser, the address of a dashboard that was just started, and a folder for files."""
     with (
         tempfile.TemporaryDirectory() as name,
         dashboard(Path(name)) as address,
         sync_playwright() as playwright,
     ):
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser, address, Path(name)
+        browser.close()
+
+
+@contextlib.contextmanager
+def opened() -> Iterator[tuple[Page, str, Path]]:
+    """A window, the address of a dashboard that was just started, and a folder for files."""
+    with served() as (browser, address, folder):
         page = browser.new_page(viewport={"width": 1440, "height": 900})
         page.set_default_timeout(PATIENCE)
         page.add_init_script(WATCH)
-        yield page, address, Path(name)
-        browser.close()
+        yield page, address, folder
 
 
 @contextlib.contextmanager

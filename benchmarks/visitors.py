@@ -4,26 +4,22 @@ from __future__ import annotations
 
 import re
 import statistics
-import tempfile
 import time
 import urllib.request
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import replace
-from pathlib import Path
 from threading import Event
 
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
 from benchmarks.chromium import (
-    ARGUMENTS,
-    CHROMIUM,
     PATIENCE,
     WATCH,
     Release,
     answers,
-    dashboard,
+    served,
     settle,
 )
 from benchmarks.data import demonstrations
@@ -41,7 +37,7 @@ _WATCHED = ["[data-testid=stMetricValue]", "[class*=st-key-box_]"]
 def sliders(quick: bool) -> Iterable[Row]:
     """Moves of twenty visitors while rules are improved: one in a browser, the others without."""
     moves = 20 if quick else 60
-    with _server() as (address, browser, log), ExitStack() as opened:
+    with served() as (browser, address, folder), ExitStack() as opened:
         worker = _page(browser, f"{address}/improve?data=cartpole&rounds=200&max_rules=5")
         worker.get_by_test_id("stMain").get_by_role("button", name="Run", exact=True).click()
         worker.get_by_text("Round 1 of 200").first.wait_for()
@@ -67,7 +63,7 @@ def sliders(quick: bool) -> Iterable[Row]:
         at_work = _metric(address, "sarl_jobs_running")
         errors = sum(client.errors for client in clients)
         errors += page.get_by_test_id("stException").count()
-        fine = at_work == 1 and not errors and "Traceback" not in log.read_text()
+        fine = at_work == 1 and not errors and "Traceback" not in (folder / "log.txt").read_text()
     for what, seconds, who in (
         ("slider to changed figures", times, "one of 20 visitors, in a browser"),
         ("slider to the server's answer", others, "the 19 others, each every 4 s"),
@@ -103,8 +99,8 @@ def _aim(page: Page, move: int) -> Release:
 
 def uploads(quick: bool) -> Iterable[Row]:
     """Memory of the server after many uploads, each by another visitor who then goes."""
-    with tempfile.TemporaryDirectory() as name, _server() as (address, browser, log):
-        file = Path(name) / "upload.parquet"
+    with served() as (browser, address, folder):
+        file = folder / "upload.parquet"
         few = demonstrations()
         before, most = 0.0, 0.0
         count = 10 if quick else UPLOADS
@@ -124,7 +120,7 @@ def uploads(quick: bool) -> Iterable[Row]:
             most = max(most, _metric(address, "sarl_memory_bytes"))
         time.sleep(GONE)
         after = _metric(address, "sarl_memory_bytes")
-        fine = "Traceback" not in log.read_text()
+        fine = "Traceback" not in (folder / "log.txt").read_text()
     yield Row(
         f"memory after {count} uploads, their visitors gone",
         "after the first",
@@ -135,19 +131,6 @@ def uploads(quick: bool) -> Iterable[Row]:
         "at most; with the server's processes",
         fine,
     )
-
-
-@contextmanager
-def _server() -> Iterator[tuple[str, Browser, Path]]:
-    """Address of a dashboard, a browser, and the dashboard's log."""
-    with (
-        tempfile.TemporaryDirectory() as name,
-        dashboard(Path(name)) as address,
-        sync_playwright() as playwright,
-    ):
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield address, browser, Path(name) / "log.txt"
-        browser.close()
 
 
 def _page(browser: Browser, address: str) -> Page:

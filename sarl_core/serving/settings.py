@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,8 +34,8 @@ class ServerSettings:
         limits: How much they may ask for.
     """
 
-    offers: Offers = Offers()  # noqa: RUF009  # it is frozen
-    limits: ServerLimits = ServerLimits()  # noqa: RUF009
+    offers: Offers = field(default_factory=Offers)
+    limits: ServerLimits = field(default_factory=ServerLimits)
 
 
 class _Environment(msgspec.Struct, forbid_unknown_fields=True):

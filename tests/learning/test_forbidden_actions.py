@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -42,8 +43,8 @@ def one_rollout(
     learner, env = make_learner(env_id, shield, ARMS[arm], steps=STEPS, seed=3)
     assert isinstance(env, HandoverVecEnv)
     env.enforced[:left_alone] = False
-    learner.train = lambda: None  # type: ignore[method-assign]
-    learner.learn(STEPS, callback=lambda *_: not env.decision.intervened.any())
+    with patch.object(learner, "train"):
+        learner.learn(STEPS, callback=lambda *_: not env.decision.intervened.any())
     assert learner.num_timesteps == STEPS  # nothing was changed, which would have ended it
     return learner, env
 
