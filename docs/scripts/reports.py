@@ -46,7 +46,7 @@ def report(task: str, rules: str, env_id: str, called: str) -> None:
     episodes = EPISODES.get(task, USUAL_EPISODES)
     comparison(env_id, Path(rules), called, Path(csv), episodes)
     data = f"data/demonstrations/{task}.parquet"
-    sarl(f"report {rules} --demonstrations {data} --comparison {csv} --out {out}")
+    sarl(f"report {rules} --demonstrations {data} --comparison {csv} --date '' --out {out}")
 
 
 if __name__ == "__main__":

@@ -83,11 +83,14 @@ def report(
         str, typer.Option("--author", metavar="TEXT", show_default=False, help="Who wrote it.")
     ] = "",
     date: Annotated[
-        str,
+        str | None,
         typer.Option(
-            "--date", metavar="TEXT", show_default=False, help="As it is to stand on the report."
+            "--date",
+            metavar="TEXT",
+            show_default="today",
+            help="As it is to stand on the report; '' for none.",
         ),
-    ] = "",
+    ] = None,
     logo: Annotated[
         Path | None,
         typer.Option(
@@ -165,14 +168,15 @@ def report(
         from sarl_core.demonstrations.formats.mapping.roles import as_options
         from sarl_core.demonstrations.recoding import recoded
         from sarl_core.explaining.report.comparison import read_results
-        from sarl_core.explaining.report.cover import Cover, read_logo
+        from sarl_core.explaining.report.cover import Cover, read_logo, today_text
         from sarl_core.explaining.report.provenance import command_line, mining_command
         from sarl_core.explaining.report.report import make_report
-        from sarl_core.explaining.report.thresholds import read_card
+        from sarl_core.explaining.report.rule_set_card import read_card
         from sarl_core.explaining.words.sign_off import approvals_document
         from sarl_core.mining.rule_set import RuleSet
         from sarl_core.studies.certificate_files import load_certificate
 
+        date = today_text() if date is None else date
         cover = Cover(
             title=title,
             author=author,
@@ -209,7 +213,7 @@ def report(
             "--certificate": [called(path) for path in certificate or ()],
             "--title": title or None,
             "--author": author or None,
-            "--date": date or None,
+            "--date": date,
             "--logo": logo,
             "--notes": notes or None,
             "--sign-off": list(signer or ()),
@@ -284,7 +288,9 @@ def report(
         f"{document.pictures:,} pictures, {size / 1e6:.1f} MB."
     ]
     if slides is not None:
-        lines.append(f"Wrote {slides}: {counted(document.in_full + 2, 'slide')}.")
+        from sarl_core.explaining.report.slides import BESIDE_RULES
+
+        lines.append(f"Wrote {slides}: {counted(document.in_full + BESIDE_RULES, 'slide')}.")
     if document.without:
         lines.append(f"There are no pictures: {document.without}.")
     from sarl_core.cli.answers.summaries import print_notes

@@ -37,6 +37,19 @@ _FAILURES: dict[str, str | float] = {
 }
 
 
+# The same for who knows only the task, of an episode.
+_MEANINGS = {
+    "LunarLander": "the lander crashes or leaves the field",
+    "LunarLanderContinuous": "the lander crashes or leaves the field",
+    "BipedalWalker": "the walker falls",
+    "BipedalWalkerHardcore": "the walker falls",
+    "CarRacing": "the car leaves the field",
+    "CartPole": "the pole falls or the cart leaves its track",
+    "InvertedPendulum": "the pole falls",
+    "InvertedDoublePendulum": "the poles fall",
+    "Driving": "the car crashes",
+}
+
 # Packages whose every environment says so itself, and by which key of `info`.
 _INFO_KEYS = {"highway_env": "crashed"}
 
@@ -151,8 +164,28 @@ def failure_text(environment: EnvironmentOrId) -> str:
     return "an end that is no time limit" if meaning == _EVERY_END else ""
 
 
+def failure_meaning(env_id: str) -> str:
+    """When an episode fails, for who knows only the task.
+
+    Args:
+        env_id: Environment.
+
+    Returns:
+        As "the lander crashes or leaves the field", or else as "it comes to an end that is no time
+        limit"; "" where it is not known, or there is none.
+    """
+    if own := _MEANINGS.get(_family(env_id)):
+        return own
+    text = failure_text(env_id) if env_id else ""
+    return f"it comes to {text}" if text else ""
+
+
 def _end_of_failure(env_id: str) -> str | float | None:
-    return _FAILURES.get(re.sub(r"-v\d+$", "", env_id.rsplit(":", 1)[-1]))
+    return _FAILURES.get(_family(env_id))
+
+
+def _family(env_id: str) -> str:
+    return re.sub(r"-v\d+$", "", env_id.rsplit(":", 1)[-1])
 
 
 def _package(env_id: str) -> str:

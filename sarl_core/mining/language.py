@@ -94,6 +94,21 @@ def counted(count: int, noun: str) -> str:
     return f"{count:,} {noun}{'' if count == 1 else 's'}"
 
 
+def listed(names: Sequence[str], *, most: int) -> str:
+    """Names one after the other.
+
+    Args:
+        names: Any number.
+        most: So many are named, the others counted.
+
+    Returns:
+        As "wind, load and height", or "wind, load and 3 others"; "" without any.
+    """
+    more = len(names) - most
+    every = [*names] if more <= 0 else [*names[:most], f"{more:,} other{'s' if more > 1 else ''}"]
+    return " and ".join(filter(None, (", ".join(every[:-1]), *every[-1:])))
+
+
 def share_text(share: float, *, decimals: int | None = None) -> str:
     """A share as a percentage that never rounds up to all or down to none.
 

@@ -140,17 +140,31 @@ def mean_interval(values: ArrayLike) -> MeanInterval:
         The mean and its interval; with one value, or equal ones, the interval is that value; NaN
         without any.
     """
-    from scipy.special import stdtrit
-
     array = np.asarray(values, dtype=np.float64).reshape(-1)
     array = array[~np.isnan(array)]
     if len(array) == 0:
         return MeanInterval(float("nan"), float("nan"), float("nan"))
-    mean = float(array.mean())
     if (array == array[0]).all():
-        value = float(array[0])
-        return MeanInterval(value, value, value)
-    half = float(stdtrit(len(array) - 1, 0.975)) * float(array.std(ddof=1)) / len(array) ** 0.5
+        return mean_interval_of(float(array[0]), 0.0, len(array))
+    return mean_interval_of(float(array.mean()), float(array.std(ddof=1)), len(array))
+
+
+def mean_interval_of(mean: float, deviation: float, count: int) -> MeanInterval:
+    """The same of numbers of which no more is known.
+
+    Args:
+        mean: Of the values.
+        deviation: Their standard deviation, by one less than their number.
+        count: How many they are, at least one.
+
+    Returns:
+        The mean and its interval; with one value, or equal ones, the interval is that value.
+    """
+    from scipy.special import stdtrit
+
+    if count == 1 or deviation == 0.0:
+        return MeanInterval(mean, mean, mean)
+    half = float(stdtrit(count - 1, 0.975)) * deviation / count**0.5
     return MeanInterval(mean, mean - half, mean + half)
 
 

@@ -21,8 +21,8 @@ from sarl_core import (
 from sarl_core.explaining.report.comparison import Result
 from sarl_core.explaining.report.provenance import mining_command
 from sarl_core.explaining.report.report import Wishes, make_report
+from sarl_core.explaining.report.rule_set_card import read_card
 from sarl_core.explaining.report.tally import Share, tally
-from sarl_core.explaining.report.thresholds import read_card
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.mining.editing.rounding import merged_rules, rounded_rules
 from sarl_core.mining.language import share_text
@@ -226,7 +226,7 @@ def test_compact_rules_are_told_by_their_budget_and_their_card() -> None:
     page = Page(make_report(rule_set, data, **PLAIN, card=card).html)
     assert f"The budget was {card['budget']:,} rules" in page.text
     assert f"{card['reported']['mean']:.0f}" in page.text
-    assert "made from other data than the demonstrations" in page.text
+    assert f"made from more than these: from {rule_set.source.steps:,} states" in page.text
     assert "plane" not in {a.get("class") for tag, a in page.tags if tag == "table"}
 
 
@@ -255,7 +255,7 @@ def test_held_out_episodes_stand_beside_what_was_mined(cart: Demonstrations) -> 
     found = with_held_out(mine_rules(split.mined, supp_min=0.005, conf_min=0.95), split.held_out)
     assert tally(found, cart).split
     text = Page(make_report(found, cart, **PLAIN).html).text
-    assert f"mined from {split.mined.n_episodes} episodes of these" in text
+    assert f"read off from {split.mined.n_episodes} episodes of these" in text
     for rule in found.rules:
         held = rule.held_out
         assert held is not None
@@ -348,9 +348,10 @@ def test_what_rules_were_made_from_has_no_interval_and_other_episodes_have(
         assert f"{told.correct:,} of {told.samples:,} states" in text
         assert told.episodes >= 5
         assert (
-            f"{share_text(told.share)} of its states in an episode, on average over "
-            f"{told.episodes} episodes; between {share_text(told.low)[:-2]} and "
-            f"{share_text(told.high)} is what that can tell"
+            f"{share_text(told.share)} of its states in an episode of episodes kept aside, which "
+            f"it was not made from, on average over {told.episodes} episodes between "
+            f"{share_text(told.low)[:-2]} and {share_text(told.high)} is what that can tell; "
+            f"of all together: {told.correct:,} of {told.samples:,} states"
         ) in text
     # Of what they were mined from alone, nothing of that kind is said.
     plain = Page(make_report(mine_rules(cart, supp_min=0.005, conf_min=0.95), cart, **PLAIN).html)
@@ -363,7 +364,7 @@ def test_rules_of_other_demonstrations_are_judged_by_episodes(cart: Demonstratio
     told = with_held_out(rules, rest).rules[0].held_out
     text = Page(make_report(rules, rest, **PLAIN).html).text
     assert f"{told.correct:,} of {told.samples:,} states" in text
-    assert f"on average over {told.episodes} episodes; between {share_text(told.low)[:-2]}" in text
+    assert f"on average over {told.episodes} episodes between {share_text(told.low)[:-2]}" in text
 
 
 def test_rules_that_know_few_episodes_are_doubted(cart: Demonstrations) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from sarl_core import InputError, RuleSet, load_demonstrations, load_rules, make_report
 from sarl_core.explaining.report.certificates import certificates_part
-from sarl_core.explaining.report.thresholds import read_card
+from sarl_core.explaining.report.rule_set_card import read_card
 from sarl_core.explaining.words.certificate import LIMITS, certificate_facts
 from sarl_core.studies.certificate import Certificate
 from sarl_core.studies.certificate_files import certificate_from
@@ -51,7 +51,7 @@ def test_a_certificate_stands_in_the_report_once_in_short_and_once_in_full(rules
         card=read_card(RULES / "cartpole_compact.json"),
         certificates=[certificate],
     )
-    short, full = report.html.split('id="worth"')
+    short, full = report.html.replace("\N{NO-BREAK SPACE}", " ").split('id="worth"')
     assert [part.count("at most 0.1 % of the episodes fail.") for part in (short, full)] == [1, 1]
     assert LIMITS in report.html
     assert "19500000 to 19502994" in report.html

@@ -1,13 +1,16 @@
 from __future__ import annotations
 
 import gc
+import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from sarl_core import InputError, load_demonstrations, mine_rules
 from sarl_core.explaining.report.comparison import (
+    ResultFile,
     compared,
     read_results,
     results_from_text,
@@ -37,7 +40,8 @@ def test_the_table_of_the_page_reads_as_what_was_run(comparison: Comparison, tmp
     path = tmp_path / "comparison.csv"
     frame.to_csv(path, index=False)
     found = read_results(path)
-    assert found == results_of(comparison)
+    file = ResultFile("comparison.csv", hashlib.sha256(path.read_bytes()).hexdigest())
+    assert found == tuple(replace(one, file=file) for one in results_of(comparison))
     assert [one.mean for one in found] == [one.returns.mean() for one in comparison.episodes]
     assert (found[0].rules, found[0].changed) == (None, None)
     assert found[1].rules == 5

@@ -84,7 +84,7 @@ def test_the_report_of_probed_rules_counts_failures_and_what_the_expert_did(
     first = max(probed.rules, key=lambda rule: rule.support)
     share = counts.shares[probed.rules.index(first)]
     assert f"After it the expert failed in {first.correct:,} of {first.samples:,} states" in text
-    assert f"The expert did not in {share.part:,} of {share.whole:,} states" in text
+    assert f"of all together: {share.part:,} of {share.whole:,} states" in text
     assert "failed after it in" in text  # in the table
     assert "did so in" not in text
     assert "19 rules in plain language come from probes" in re.sub(r"\s+", " ", report.slides)

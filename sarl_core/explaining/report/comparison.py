@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,19 @@ HARMS: Effect = "harms"
 
 
 @dataclass(frozen=True)
+class ResultFile:
+    """Where results were read from.
+
+    Attributes:
+        name: Of the file.
+        digest: SHA-256 of its text.
+    """
+
+    name: str
+    digest: str
+
+
+@dataclass(frozen=True)
 class Result:
     """What the episodes of one agent, with a shield or without, came to.
 
@@ -72,6 +86,7 @@ class Result:
         effect: What that and the failures mean: helps, harms, or no difference seen; "" where
             unknown.
         agent: Who acted; "" where unknown.
+        file: It was read from; None where it was measured just now.
     """
 
     name: str
@@ -96,6 +111,7 @@ class Result:
     gained: MeanInterval | None = None
     effect: str = ""
     agent: str = ""
+    file: ResultFile | None = None
 
 
 @dataclass(frozen=True)
@@ -199,8 +215,11 @@ def results_from_text(text: str, name: str) -> tuple[Result, ...]:
         raise InputError(
             f"the comparison {name} has {len(rows)} rows; give one with 1 to {_MOST_ROWS}"
         )
+    file = ResultFile(name, hashlib.sha256(text.encode("utf-8")).hexdigest())
     try:
-        return tuple(conformed(row, _ResultRow, strict=False).read() for row in rows)
+        return tuple(
+            replace(conformed(row, _ResultRow, strict=False).read(), file=file) for row in rows
+        )
     except MisfitError as error:
         raise InputError(f"in the comparison {name}, {error}; download it again") from error
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import datetime
 import io
 from dataclasses import dataclass
 from pathlib import Path
@@ -103,6 +104,12 @@ class Cover:
     def paragraphs(self) -> tuple[str, ...]:
         """The notes, line by line."""
         return tuple(line for line in map(_line, self.notes.splitlines()) if line)
+
+
+def today_text() -> str:
+    """The day, as a date that one gives may be written: "28 November 2026"."""
+    day = datetime.date.today()
+    return f"{day.day} {day:%B %Y}"
 
 
 PLAIN = Cover()

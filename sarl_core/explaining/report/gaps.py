@@ -16,7 +16,7 @@ from sarl_core.explaining.report.rule_cards import least_share
 from sarl_core.explaining.report.svg import NEUTRAL, share_bar
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.evidence import FEWEST_EPISODES
-from sarl_core.mining.language import counted, share_text
+from sarl_core.mining.language import counted, listed, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.validation.contradictions import NEAR, find_contradictions
 from sarl_core.mining.validation.holding_out import verdict
@@ -24,6 +24,7 @@ from sarl_core.rendering.example_frames import Examples, PlayedEpisodes
 
 FEW_STATES = 30
 _MOST_NAMED = 24
+_MOST_UNUSED = 6
 _MOST_COMPARED = 50_000  # steps; to compare more states with each other takes minutes
 
 
@@ -68,6 +69,7 @@ class Beyond:
         steps: How many steps.
         covered: Share at which some rule applied.
         outside: Share at which some number lay beyond all demonstrated ones.
+        outside_share: The same as a number; NaN where it is not known.
         far: Share at which a rule applied beyond its own states; "" where that is not known.
     """
 
@@ -75,6 +77,7 @@ class Beyond:
     steps: str
     covered: str
     outside: str
+    outside_share: float
     far: str
 
 
@@ -88,6 +91,7 @@ class UncoveredSummary:
         doubts: Rules that deserve a second look.
         beyond: One entry a player; () without pictures.
         with_boxes: Whether `Beyond.far` is known.
+        unused: Features that no rule asks about, in words; "" where there are none.
     """
 
     coverage: tuple[Coverage, ...]
@@ -95,6 +99,7 @@ class UncoveredSummary:
     doubts: tuple[Doubt, ...]
     beyond: tuple[Beyond, ...]
     with_boxes: bool
+    unused: str = ""
 
 
 def gaps(
@@ -126,7 +131,26 @@ def gaps(
             for one in (examples.played if examples is not None else ())
         ),
         with_boxes=boxed,
+        unused=_unused(rule_set),
     )
+
+
+def _unused(rule_set: RuleSet) -> str:
+    """Features of the demonstrations that no rule asks about, whether by itself or in a formula."""
+    features = rule_set.source.features
+    used: set[int] = set()
+    for rule in rule_set.rules:
+        for bounds in rule.bounds if rule.enabled else ():
+            derived = features[bounds.feature].derived
+            used |= {bounds.feature} if derived is None else set(derived.features)
+    columns = dict.fromkeys(
+        one.name if one.indicator is None else one.indicator.column
+        for place, one in enumerate(features)
+        if one.derived is None and place not in used
+    )
+    looked_at = {one.column for place in used if (one := features[place].indicator) is not None}
+    names = [f"“{name}”" for name in columns if name not in looked_at]
+    return listed(names, most=_MOST_UNUSED)
 
 
 def _coverage(rule_set: RuleSet, tally: Tally, dimension: int) -> Coverage:
@@ -229,11 +253,13 @@ def _beyond(
     low, high = demonstrations.observations.min(axis=0), demonstrations.observations.max(axis=0)
     outside = ((states < low) | (states > high)).any(axis=1)
     covered = (rules >= 0).any(axis=1)
+    known, share = demonstrations.sample_of is None, float(outside.mean())
     return Beyond(
         player=played.player.name,
         steps=f"{len(states):,}",
         covered=share_text(float(covered.mean())),
-        outside="not known" if demonstrations.sample_of else share_text(float(outside.mean())),
+        outside=share_text(share) if known else "not known",
+        outside_share=share if known else float("nan"),
         far=share_text(float(_far(states, rules, rule_set).mean())) if boxed else "",
     )
 

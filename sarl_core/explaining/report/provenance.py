@@ -14,6 +14,7 @@ from sarl_core.demonstrations.formats.mapping.roles import Roles, as_options
 from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.environments.environment import Environment
 from sarl_core.environments.formulas import Formula
+from sarl_core.explaining.report.comparison import Result
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.combining.choice import with_combinations
@@ -23,6 +24,7 @@ from sarl_core.mining.never.never_rules import mine_never_rules, with_never_rule
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.mining.rules import NAMED_SETTINGS
 from sarl_core.mining.tree import PolicyTree
+from sarl_core.rollouts.seeds import FRESH
 
 _PACKAGES = ("numpy", "scikit-learn", "gymnasium", "pillow", "jinja2")
 _PROGRAM = "python -m sarl_core"
@@ -36,6 +38,7 @@ def facts(
     rules_name: str,
     demonstrations_name: str,
     seeds: tuple[int, int] | None,
+    compared: Sequence[Result] = (),
     notes: Sequence[str] = (),
 ) -> tuple[tuple[str, str], ...]:
     """What tells a report from any other.
@@ -47,6 +50,7 @@ def facts(
         rules_name: Of the rule file, "" where there is none.
         demonstrations_name: Of their file, likewise.
         seeds: First and last of the episodes that were played; None where none were.
+        compared: Results of the report.
         notes: What is to be said of how rules and demonstrations were matched.
 
     Returns:
@@ -60,6 +64,8 @@ def facts(
     if not tally.same:
         size = f"{source.steps:,} steps in {counted(source.episodes, 'episode')}"
         entries.append(("Rules were made from", _named(source.digest, size)))
+    files = dict.fromkeys(one.file for one in compared if one.file is not None)
+    entries += [("Comparison", _named(one.digest, one.name)) for one in files]
     if demonstrations.seed is not None:
         entries.append(("Seed of the demonstrations", str(demonstrations.seed)))
     if seeds is not None:
@@ -68,6 +74,39 @@ def facts(
     versions = [f"Python {platform.python_version()}"]
     versions += [f"{package} {_version(package)}" for package in _PACKAGES]
     return (*entries, ("Versions", ", ".join(versions)))
+
+
+def how_to_measure(env_id: str, *, measured: bool, certified: bool) -> tuple[str, ...]:
+    """What is to be done to know what rules are worth, as far as that is not known.
+
+    Args:
+        env_id: Environment, "" where it is not known.
+        measured: Whether somebody was run under the rules.
+        certified: Whether a rate of failures is certified.
+
+    Returns:
+        Sentences with commands.
+    """
+    sentences = []
+    if not measured and not env_id:
+        sentences.append(
+            "The demonstrations name no environment to run anybody in. Hold the rules against a "
+            "log of what somebody did (“sarl audit”), or run an agent in a simulation of yours "
+            "with the rules and without (“sarl evaluate --env”), and add the results with "
+            "“--comparison”."
+        )
+    elif not measured:
+        sentences.append(
+            "Run an agent with the rules and without on the same seeds, on the page Measure or "
+            f"with “sarl evaluate --env {env_id} --agent novice --seed {FRESH} --json”, once with "
+            "“--rules” and once without, and add both results with “--comparison”."
+        )
+    if not certified and env_id:
+        sentences.append(
+            "Whether failures stay below a rate that one can bear is tested by “sarl certify”; its "
+            "certificate is added with “--certificate”."
+        )
+    return tuple(sentences)
 
 
 def _named(digest: str, name: str) -> str:

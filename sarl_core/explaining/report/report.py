@@ -29,15 +29,17 @@ from sarl_core.explaining.report.pdf import document_to_pdf
 from sarl_core.explaining.report.provenance import (
     commands_that_hold,
     facts,
+    how_to_measure,
     mined_again,
     mined_alike,
 )
+from sarl_core.explaining.report.rule_set_card import reported_of
 from sarl_core.explaining.report.rules import in_order, rules_part
 from sarl_core.explaining.report.slides import slides_document
 from sarl_core.explaining.report.summary import summary_part
 from sarl_core.explaining.report.tally import Tally, report_rules, same_environment, tally
-from sarl_core.explaining.report.thresholds import achieved_text, thresholds_part
-from sarl_core.explaining.templates import render
+from sarl_core.explaining.report.thresholds import thresholds_part
+from sarl_core.explaining.templates import render, whole_percents
 from sarl_core.explaining.words.cross_fit import judged_sentence, parting_text
 from sarl_core.explaining.words.sign_off import SignOff, sign_off_text
 from sarl_core.files import as_path, whole_file
@@ -272,11 +274,12 @@ def make_report(
             certified=certified,
             gaps=uncovered,
             elsewhere=elsewhere,
-            achieved=achieved_text(card),
+            reported=reported_of(card),
             sign_off=wishes.sign_off,
         ),
         "key_numbers": _key_numbers(rule_set, counts),
         "sign_off": sign_off_text(wishes.sign_off),
+        "approved": wishes.sign_off is not None and bool(wishes.sign_off.approvals),
         "elsewhere": elsewhere,
         "demonstrations": demonstrations_part(rule_set, demonstrations, counts),
         "thresholds": thresholds_part(rule_set, counts, trees, card),
@@ -293,12 +296,18 @@ def make_report(
             rules_name=wishes.rules_name,
             demonstrations_name=wishes.demonstrations_name,
             seeds=(wishes.seed, wishes.seed + wishes.episodes - 1) if examples else None,
+            compared=comparison,
             notes=() if same_environment(rule_set, demonstrations) else notes,
+        ),
+        "to_measure": how_to_measure(
+            about,
+            measured=any(one.changed is not None for one in comparison),
+            certified=bool(certified.verdicts),
         ),
         "commands": commands_that_hold(wishes.commands, as_given, trees),
     }
     return Report(
-        html=render("documents/report", **parts),
+        html=whole_percents(render("documents/report", **parts)),
         rules=len(rule_set),
         in_full=len(order[0]),
         pictures=sum(len(of_rule) for of_rule in examples.frames.values()) if examples else 0,

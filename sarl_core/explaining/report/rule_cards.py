@@ -278,24 +278,28 @@ def _tried(did: str, source: str, held_out: HeldOut, threshold: float | None) ->
         return _nothing(did, source)
     interval = held_out.interval
     below = threshold is not None and interval is not None and interval.high < threshold
-    if held_out.share is None:  # an older file counted states alone
-        interval_text, share = (
-            "the file does not say in how many episodes they lie",
-            held_out.correct / held_out.samples,
+    of_all = _states(Share(held_out.correct, held_out.samples))
+    text, on_average, interval_text = of_all, "", "the file does not say in how many episodes"
+    share = held_out.share
+    if share is not None:  # the number is the bar's: each episode counts once
+        text, of_all = (
+            f"{share_text(share)} of its states in an episode",
+            f"of all together: {of_all}",
         )
-    else:
-        share = held_out.share
-        interval_text = f"{share_text(share)} of its states in an episode, on average over "
-        interval_text += f"{counted(held_out.episodes, 'episode')}; "
-        interval_text += (
-            "these are too few to say more" if interval is None else what_tells(interval)
-        )
+        on_average = f", on average over {counted(held_out.episodes, 'episode')}"
+        extent = "too few to say more" if interval is None else what_tells(interval)
+        interval_text = f"{extent}; {of_all}"
     return Evidence(
         did=did,
-        source=source,
-        text=_states(Share(held_out.correct, held_out.samples)),
-        interval=f"{interval_text}{', below the threshold' if below else ''}",
-        bar=evidence_bar(share, interval, below=below, threshold=threshold),
+        source=f"{source}{on_average}",
+        text=text,
+        interval=f"{interval_text}{'; below the threshold' if below else ''}",
+        bar=evidence_bar(
+            held_out.correct / held_out.samples if share is None else share,
+            interval,
+            below=below,
+            threshold=threshold,
+        ),
         below=below,
     )
 

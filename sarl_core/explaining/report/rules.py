@@ -9,10 +9,11 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import Combination
 from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import feature_rows
+from sarl_core.explaining.report.origin import origin_text
 from sarl_core.explaining.report.rule_cards import Card, rule_card, tags
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.action_words import says_text
-from sarl_core.mining.language import conditions_text, counted, share_text
+from sarl_core.mining.language import conditions_text, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.rendering.example_frames import Examples
@@ -145,7 +146,7 @@ def rules_part(
     lines = tuple(_line(rule_set, index) for index in rest[:MOST_IN_TABLE])
     return Rules(
         introduction=(
-            *_introduction(rule_set, tally, len(full), len(rest)),
+            *_introduction(rule_set, demonstrations, tally, len(full), len(rest)),
             *_on_combinations(rule_set, full),
         ),
         beneath=_beneath(rule_set),
@@ -193,7 +194,9 @@ def _on_combinations(rule_set: RuleSet, full: Sequence[int]) -> tuple[str, ...]:
     )
 
 
-def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tuple[str, ...]:
+def _introduction(
+    rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally, full: int, rest: int
+) -> tuple[str, ...]:
     if not rule_set.rules:
         return (
             "There is no rule: no part of the tree reaches the thresholds. Such a shield leaves "
@@ -225,21 +228,8 @@ def _introduction(rule_set: RuleSet, tally: Tally, full: int, rest: int) -> tupl
             f"There are {len(rule_set.rules):,} rules. The {full:,} that apply most often{each} "
             f"are shown in full, the other {rest:,} in a table after them."
         )
-    if tally.split:
-        sentences.append(
-            f"The rules were mined from {counted(rule_set.source.episodes, 'episode')} of these "
-            "demonstrations; the others were kept aside to try the rules on."
-        )
-    elif any(rule.origin == "probed" for rule in rule_set.rules):
-        sentences.append(
-            f"The rules were made from probes of {counted(rule_set.source.steps, 'state')}, and "
-            "not from the demonstrations of this report; both counts are shown."
-        )
-    elif not tally.same:
-        sentences.append(
-            "The rules were made from other data than the demonstrations of this report (from "
-            f"{counted(rule_set.source.steps, 'state')}); both counts are shown."
-        )
+    if not tally.same:
+        sentences.append(origin_text(rule_set, demonstrations, tally))
     return tuple(sentences)
 
 

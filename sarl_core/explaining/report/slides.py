@@ -1,4 +1,4 @@
-"""A report as slides: what it comes to, one rule each, and what to decide."""
+"""A report as slides: what it comes to, one rule each, how sure it is, and what to decide."""
 
 from __future__ import annotations
 
@@ -7,7 +7,10 @@ import hashlib
 from collections.abc import Mapping
 from typing import Any
 
-from sarl_core.explaining.templates import render
+from sarl_core.explaining.templates import render, whole_percents
+
+BESIDE_RULES = 5
+"""How many slides there are beside those of the rules."""
 
 
 def slides_document(parts: Mapping[str, Any]) -> str:
@@ -23,4 +26,6 @@ def slides_document(parts: Mapping[str, Any]) -> str:
     code = render("documents/slides_script")
     digest = base64.b64encode(hashlib.sha256(code.encode()).digest()).decode("ascii")
     cards = [card for group in parts["rules"].groups for card in group.cards]
-    return render("documents/slides", **parts, cards=cards, code=code, code_digest=digest)
+    return whole_percents(
+        render("documents/slides", **parts, cards=cards, code=code, code_digest=digest)
+    )

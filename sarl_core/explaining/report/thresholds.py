@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from msgspec import Struct
 
-from sarl_core.documents import Count, Number, Share, fitting, read_object
+from sarl_core.documents import fitting
 from sarl_core.explaining.colours import layer_colour
+from sarl_core.explaining.report.rule_set_card import ReportedEpisodes, RuleSetCard
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.edit_counts import edits_sentence
 from sarl_core.mining.language import counted, number_text, share_text, threshold_text
@@ -21,7 +20,6 @@ from sarl_core.mining.rules import FILTERED, NAMED_SETTINGS, UNFILTERED, Thresho
 from sarl_core.mining.thresholds.landscape import Landscape, threshold_landscape
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.rollouts.failures import rate_text
-from sarl_core.rollouts.statistics import Rate
 
 # Fine where the rules change fast: at small supports and high confidences.
 _SUPPORTS = (0.0, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
@@ -100,87 +98,6 @@ class ThresholdsPart:
     card: tuple[tuple[str, str], ...]
 
 
-class _RuleSetCard(Struct):
-    """What a card may say."""
-
-    budget: Count | None = None
-    rounds: list[Any] = []
-    chosen_round: Count | None = None
-    refined: bool | None = None
-    chosen_by: str | None = None
-    reported: dict[str, Any] = {}
-    reported_on: str | None = None
-    seed: Count | None = None
-    command: str | None = None
-
-
-class _Reported(Struct):
-    """What it may say of the episodes that it reports."""
-
-    episodes: Count | None = None
-    mean: Number | None = None
-    std: Number | None = None
-    min: Number | None = None
-    max: Number | None = None
-    failures: Count | None = None
-    failure_low: Share | None = None
-    failure_high: Share | None = None
-    cut: Count | None = None
-    undecided: Count | None = None
-    worst_tenth: Number | None = None
-    cost: Number | None = None
-    cost_low: Number | None = None
-    cost_high: Number | None = None
-
-    @property
-    def rate(self) -> Rate | None:
-        """Of failures, where all is there that tells it."""
-        low, high = self.failure_low, self.failure_high
-        if self.failures is None or not self.episodes or low is None or high is None:
-            return None
-        unknown = self.undecided if self.undecided is not None else self.cut or 0
-        share = self.failures / self.episodes
-        return Rate(self.failures, self.episodes, share, low, high, unknown)
-
-
-def read_card(rules: Path) -> Mapping[str, Any] | None:
-    """The card beside a rule file, which says how the rules were made.
-
-    Args:
-        rules: As "rules.json"; its card is "rules.card.json".
-
-    Returns:
-        None where there is none.
-
-    Raises:
-        InputError: If it cannot be read.
-    """
-    path = rules.with_suffix(".card.json")
-    if not path.is_file():
-        return None
-    return read_object(path, "mend this card or take it away")
-
-
-def achieved_text(card: Mapping[str, Any] | None) -> str:
-    """What an agent that follows the rules achieved where they were made.
-
-    Args:
-        card: Of the rule file, None without one.
-
-    Returns:
-        A sentence; "" where the card does not say.
-    """
-    reported = fitting(fitting(card, _RuleSetCard).reported, _Reported)
-    if reported.mean is None:
-        return ""
-    over = f" over {counted(reported.episodes, 'episode')}" if reported.episodes else ""
-    failed = "" if reported.rate is None else f"; failures: {rate_text(reported.rate)}"
-    return (
-        "Where the rules were made, an agent that follows them had a mean return of "
-        f"{number_text(reported.mean)}{over}{failed}."
-    )
-
-
 def thresholds_part(
     rule_set: RuleSet,
     tally: Tally,
@@ -198,7 +115,7 @@ def thresholds_part(
     Returns:
         The part of the report.
     """
-    entries = fitting(card, _RuleSetCard)
+    entries = fitting(card, RuleSetCard)
     facts = tuple(_card_facts(entries, forbids=rule_set.forbids))
     edits = edits_sentence(rule_set)
     then = (edits,) if edits else ()
@@ -369,7 +286,7 @@ def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighb
 # --- a budget ----------------------------------------------------------------------------------
 
 
-def _built(rule_set: RuleSet, card: _RuleSetCard) -> tuple[str, ...]:
+def _built(rule_set: RuleSet, card: RuleSetCard) -> tuple[str, ...]:
     if rule_set.cut != "leaves":
         return _cut(rule_set)
     sentences = [
@@ -401,7 +318,7 @@ def _built(rule_set: RuleSet, card: _RuleSetCard) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _card_facts(card: _RuleSetCard, *, forbids: bool) -> Iterator[tuple[str, str]]:
+def _card_facts(card: RuleSetCard, *, forbids: bool) -> Iterator[tuple[str, str]]:
     """What a card says."""
     agent = "an agent under the rules" if forbids else "an agent that follows the rules"
     if card.budget is not None:
@@ -414,7 +331,7 @@ def _card_facts(card: _RuleSetCard, *, forbids: bool) -> Iterator[tuple[str, str
         yield "Thresholds moved to achieve more", "yes" if card.refined else "no"
     if card.chosen_by is not None:
         yield "Chosen by", card.chosen_by
-    reported = fitting(card.reported, _Reported)
+    reported = fitting(card.reported, ReportedEpisodes)
     if reported.mean is not None:
         yield (
             f"Mean return of {agent}",
@@ -433,7 +350,7 @@ def _card_facts(card: _RuleSetCard, *, forbids: bool) -> Iterator[tuple[str, str
         between = _with(" (95 % interval {} to {})", reported.cost_low, reported.cost_high)
         yield f"Cost of {agent}", cost + between
     if card.reported_on is not None:
-        yield "Reported on", card.reported_on
+        yield "ReportedEpisodes on", card.reported_on
     if card.seed is not None:
         yield "Seed", number_text(card.seed)
     if card.command is not None:

@@ -6,6 +6,7 @@ on a page and not with each piece; a document that opens by itself has it in its
 
 from __future__ import annotations
 
+import re
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,6 +30,18 @@ def render(name: str, **values: object) -> Markup:
         HTML without script, or a document.
     """
     return Markup(_template(name).render(values))
+
+
+def whole_percents(html: Markup) -> Markup:
+    """A document in which no line ends between a number and its percent sign.
+
+    Args:
+        html: The document.
+
+    Returns:
+        The same with spaces between them that do not break.
+    """
+    return Markup(re.sub(r"(?<=\d) %", "\N{NO-BREAK SPACE}%", html))
 
 
 @lru_cache(maxsize=1)

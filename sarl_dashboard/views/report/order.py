@@ -10,8 +10,8 @@ from sarl_core.explaining.report.comparison import Result, results_from_text
 from sarl_core.explaining.report.cover import Cover, logo_of
 from sarl_core.explaining.report.provenance import command_line, mining_command
 from sarl_core.explaining.report.report import Wishes
+from sarl_core.explaining.report.rule_set_card import read_card
 from sarl_core.explaining.report.tally import report_rules
-from sarl_core.explaining.report.thresholds import read_card
 from sarl_core.library.items import PREFIX
 from sarl_core.mining.rule_set import RuleSet
 from sarl_dashboard.jobs.report import ReportOrder, as_results, comparison_of_session
@@ -155,7 +155,7 @@ def commands(
             "--comparison": list(named.results),
             "--title": choices.cover.title or None,
             "--author": choices.cover.author or None,
-            "--date": choices.cover.date or None,
+            "--date": choices.cover.date,
             "--logo": None if choices.cover.logo is None else choices.cover.logo.name,
             "--notes": choices.cover.notes or None,
             "--sign-off": list(choices.cover.signers),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import streamlit as st
 from streamlit.runtime.uploaded_file_manager import UploadedFile
 
-from sarl_core.explaining.report.cover import MOST_LINE, MOST_NOTES, MOST_TITLE
+from sarl_core.explaining.report.cover import MOST_LINE, MOST_NOTES, MOST_TITLE, today_text
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.settings import rule_set_choice
 
@@ -92,7 +92,7 @@ def _cover_choices() -> CoverChoices:
         with st.grid(3, min_column_width=150, gap="small"):
             title = _line("Title", "report_title", MOST_TITLE, "the name of the task")
             author = _line("Author", "report_author", MOST_LINE, "")
-            date = _line("Date", "report_date", MOST_LINE, "as it is to stand there")
+            date = _line("Date", "report_date", MOST_LINE, today_text()) or today_text()
         with st.grid(2, min_column_width=200, gap="small"):
             notes = st.text_area(
                 "Notes",

@@ -1,0 +1,111 @@
+"""What is to be decided about rules: questions on the first page of a report, with reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from sarl_core.decimals import telling_text
+from sarl_core.explaining.report.certificates import CertificatesPart
+from sarl_core.explaining.report.comparison import HARMS, Result, is_known
+from sarl_core.explaining.report.gaps import UncoveredSummary
+from sarl_core.explaining.report.outcomes import (
+    MOST_PAIRS,
+    Pair,
+    failures_at_most,
+    failures_share,
+)
+from sarl_core.explaining.report.rule_set_card import ReportedEpisodes
+from sarl_core.explaining.report.tally import Tally
+from sarl_core.explaining.words.sign_off import SignOff
+from sarl_core.mining.language import counted, share_text
+
+
+@dataclass(frozen=True)
+class OpenQuestion:
+    """One thing that somebody has to decide.
+
+    Attributes:
+        question: To be answered with yes or no.
+        reason: What speaks for it or against it.
+    """
+
+    question: str
+    reason: str
+
+
+def decisions(
+    pairs: Sequence[Pair],
+    reported: ReportedEpisodes,
+    *,
+    certified: CertificatesPart,
+    gaps: UncoveredSummary,
+    counts: Tally,
+    sign_off: SignOff | None,
+) -> Iterator[OpenQuestion]:
+    """What is to be decided about rules.
+
+    Args:
+        pairs: What was measured.
+        reported: What the card of the rules says.
+        certified: What is certified.
+        gaps: What the rules do not reach.
+        counts: The rules on the demonstrations.
+        sign_off: Who approved them; None where it is not known.
+
+    Yields:
+        The weightiest first.
+    """
+    if not pairs:
+        yield OpenQuestion(
+            "Are the rules to be measured before they are put in force?",
+            "What they do to whoever is held to them is not known.",
+        )
+    yield from (_of_pair(pair) for pair in pairs[:MOST_PAIRS])
+    worst = failures_at_most(pairs, reported)
+    if worst is not None and not certified.verdicts:
+        yield OpenQuestion(
+            f"Can it be borne that up to {share_text(worst[0])} of the episodes fail?",
+            f"It is the upper end of what {counted(worst[1], 'episode')} tell. Nothing lower is "
+            "certified (section 5).",
+        )
+    if counts.coverage < 1.0:
+        yield OpenQuestion(
+            "Is it enough that the rules leave the other states alone?",
+            f"In {share_text(1.0 - counts.coverage)} of the demonstrated states no rule applies: "
+            "there every action passes.",
+        )
+    if gaps.unused:
+        yield OpenQuestion(
+            f"Is it right that no rule looks at {gaps.unused}?",
+            "It was recorded, and the rules decide without it.",
+        )
+    if gaps.doubts:
+        more = "" if len(gaps.doubts) == 1 else " And others (section 4)."
+        yield OpenQuestion(
+            "Has somebody looked at the rules that deserve a second look?",
+            f"{gaps.doubts[0].text}{more}",
+        )
+    if sign_off is not None and not sign_off.approvals:
+        yield OpenQuestion("Are the rules approved?", "Nobody has approved them yet.")
+
+
+def _of_pair(pair: Pair) -> OpenQuestion:
+    one, alone = pair.shielded, pair.alone
+    effects: dict[str, str] = {
+        "helps": f"They do better than {pair.agent} alone",
+        HARMS: f"They do worse than {pair.agent} alone",
+        "no difference seen": f"No difference to {pair.agent} alone was seen",
+    }
+    question = f"Are the rules to act in place of {pair.agent}?"
+    if not pair.is_policy:
+        question = f"Is {pair.agent} to act under the rules (“{one.name}”)?"
+        effects |= {"helps": "They help it", HARMS: "They harm it"}
+    effect = effects.get(one.effect, "What they change is not known")
+    against = "" if alone is None else f", against {_numbers(alone)} without them"
+    return OpenQuestion(question, f"{effect}: {_numbers(one)}{against}.")
+
+
+def _numbers(one: Result) -> str:
+    failed = f", {failures_share(one)} failing" if is_known(one) else ""
+    return f"mean return {telling_text(one.mean)}{failed}"
