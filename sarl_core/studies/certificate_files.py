@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,9 +16,15 @@ from sarl_core.errors import InputError
 from sarl_core.files import as_path, whole_file
 from sarl_core.limits import limited_bytes
 from sarl_core.studies.certificate import Certificate, Subject
-from sarl_core.studies.sequential_test import SequentialTest, Verdict, sequential_test
+from sarl_core.studies.sequential_test import (
+    SequentialTest,
+    Verdict,
+    chances,
+    sequential_test,
+)
 
 FORMAT, VERSION = "sarl-certificate", 1
+_ROUNDING = 1e-3  # of a look: as far as another processor may move it
 _Positive = Annotated[int, Meta(ge=1, le=2**53)]
 
 
@@ -134,9 +141,10 @@ def certificate_from(document: object, *, name: str) -> Certificate:
         )
     try:
         read = conformed(document, _CertificateDocument)
-        test = sequential_test(read.at_most, read.certainty, read.most_episodes)
+        usual = sequential_test(read.at_most, read.certainty, read.most_episodes)
     except (MisfitError, InputError) as error:
         raise InputError(f"{name} cannot be read ({error}); {advice}") from error
+    test = replace(usual, certified=read.looks.certified, refused=read.looks.refused)
     verdict = Verdict(read.certified, read.episodes, read.failures, read.undecided)
     certificate = Certificate(
         Subject(**asdict(read.tested)),
@@ -149,7 +157,7 @@ def certificate_from(document: object, *, name: str) -> Certificate:
         read.notes,
     )
     whole = (
-        (read.looks.certified, read.looks.refused) == (test.certified, test.refused)
+        _is_same_test(test, usual)
         and _gives(test, verdict)
         and read.seeds.last == certificate.last_seed
     )
@@ -198,6 +206,28 @@ def save_certificate(certificate: Certificate, path: str | Path) -> None:
     """
     with whole_file(as_path(path, ending=".json")) as unfinished:
         unfinished.write_text(certificate_to_json(certificate), encoding="utf-8")
+
+
+def _is_same_test(test: SequentialTest, usual: SequentialTest) -> bool:
+    """Whether looks are those of a test, but for what another processor rounds otherwise.
+
+    Whatever rounding moves is an episode or two of the late looks. So looks that lie elsewhere are
+    not this test's, and those that lie there must keep to its error all the same.
+    """
+    if test == usual:
+        return True
+    every = ((test.certified, usual.certified), (test.refused, usual.refused))
+    near = all(
+        abs(len(one) - len(other)) <= 1
+        and all(abs(look - at) <= 1 + at * _ROUNDING for look, at in zip(one, other, strict=False))
+        and list(one) == sorted(one)
+        and (not one or one[-1] <= test.episodes)
+        for one, other in every
+    )
+    if not near:
+        return False
+    wrong, allowed = chances(test, test.at_most), (1.0 - test.certainty) * (1.0 + 1e-6)
+    return wrong.certified <= allowed and wrong.refused <= allowed
 
 
 def _gives(test: SequentialTest, verdict: Verdict) -> bool:

@@ -128,6 +128,26 @@ def test_what_does_not_hold_together_is_refused(change, sentence, certified):
         certificate_from(document, name="it")
 
 
+def test_looks_that_another_processor_rounds_otherwise_are_read_as_they_are():
+    path = Path(__file__).parents[2] / "data" / "rules" / "lunar_lander_combined.card.json"
+    document = json.loads(path.read_text())["certificate"]
+    read = certificate_from(document, name="it")
+    late = len(read.test.refused) - 5
+    for place, by, sentence in ((late, -2, ""), (late, -40, "does not hold"), (3, 5, "does not")):
+        looks = list(read.test.refused)
+        looks[place] = max(looks[place] + by, looks[place - 1])
+        moved = document | {"looks": {"certified": list(read.test.certified), "refused": looks}}
+        if sentence:
+            with pytest.raises(InputError, match=sentence):
+                certificate_from(moved, name="it")
+            continue
+        assert certificate_from(moved, name="it").test.refused == tuple(looks)
+    early = [max(1, look - 3) for look in read.test.certified]  # which more failures would pass
+    moved = document | {"looks": {"certified": early, "refused": list(read.test.refused)}}
+    with pytest.raises(InputError, match="does not hold together"):
+        certificate_from(moved, name="it")
+
+
 def test_what_is_no_file_of_a_certificate_is_refused(tmp_path):
     path = tmp_path / "certificate.json"
     for content in (b"", b"{", b"[]", b"\xff\xfe\x00", b'{"format": NaN}'):
