@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import gc
+import os
 from contextlib import suppress
+from ipaddress import ip_address
 from typing import NoReturn
+from urllib.parse import urlsplit
 
 import psutil
 import streamlit as st
+from streamlit import config
 from streamlit.runtime.scriptrunner import StopException, get_script_run_ctx
+from streamlit.web.server.starlette.starlette_app_utils import decode_xsrf_token_string
+from streamlit.web.server.starlette.starlette_server_config import XSRF_COOKIE_NAME
+
+from sarl_core.serving import limits
 
 
 @st.cache_resource(show_spinner=False)
@@ -30,6 +38,7 @@ def settle(page: str, modules: int) -> None:
 # --- whose it is --------------------------------------------------------------------------------
 
 _LONGEST_NAME = 200  # as the library has it
+_ONLY_ONE = "the only one"
 
 
 def needs_sign_in() -> bool:
@@ -61,11 +70,56 @@ def signed_in() -> str:
 
 
 def visitor() -> str:
-    """What tells visitors apart, for what each may have: who has signed in, or else the browser."""
+    """What tells visitors apart: whose work is whose, and what each may have.
+
+    Who has signed in; else the browser, or on a server for one person nothing at all.
+    """
     context = get_script_run_ctx()
     if context is None:
         return ""
-    return signed_in() or st.context.cookies.get("_streamlit_xsrf", "") or context.session_id
+    if is_signed_in():
+        return signed_in()
+    return _ONLY_ONE if serves_one() else _browser() or context.session_id
+
+
+def serves_one() -> bool:
+    """Whether this server is one person's own, whose browsers are all the same visitor.
+
+    It listens on its own machine alone, no limits are set in its settings, nobody signs in, and no
+    proxy has brought this page from elsewhere.
+    """
+    headers = st.context.headers
+    return (
+        not needs_sign_in()
+        and limits.VARIABLE not in os.environ
+        and _is_own_machine(str(config.get_option("server.address") or ""))
+        and not any(name in headers for name in ("X-Forwarded-For", "Forwarded"))
+        and ("Host" not in headers or _is_own_machine(_host(headers["Host"])))
+    )
+
+
+def _browser() -> str:
+    """What tells browsers apart; "" where one takes no cookies.
+
+    All pages of a browser have this token, until it is closed. As text it is another at every page.
+    """
+    token, _ = decode_xsrf_token_string(st.context.cookies.get(XSRF_COOKIE_NAME, ""))
+    return token.hex() if token else ""
+
+
+def _host(said: str) -> str:
+    """Without its port."""
+    try:
+        return urlsplit(f"//{said}").hostname or ""
+    except ValueError:
+        return ""
+
+
+def _is_own_machine(name: str) -> bool:
+    try:
+        return name == "localhost" or ip_address(name).is_loopback
+    except ValueError:
+        return False
 
 
 # --- what it takes ------------------------------------------------------------------------------

@@ -77,7 +77,8 @@ def app(
         offers = _offers(
             env or [], env_args, wrapper or [], failure, cost, agent or [], said.offers
         )
-        offers[LIMITS] = said.limits.to_text()
+        if said.for_many:
+            offers[LIMITS] = said.limits.to_text()
         if cluster is not None and cluster.startswith("local:"):
             raise InputError(
                 "a dashboard works in processes of this machine anyway; give the address of a "

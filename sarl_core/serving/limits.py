@@ -11,7 +11,7 @@ import msgspec
 from sarl_core.documents import conformed, parse_json
 
 VARIABLE = "SARL_APP_LIMITS"
-"""The environment variable of the server's process."""
+"""The environment variable of the server's process; there where its settings name limits."""
 
 Gibibytes = Annotated[float, msgspec.Meta(ge=0.25, le=65536.0)]
 

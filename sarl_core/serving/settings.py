@@ -32,10 +32,12 @@ class ServerSettings:
     Attributes:
         offers: What visitors may use besides what is shipped.
         limits: How much they may ask for.
+        for_many: Whether it names limits, which one person alone does not need.
     """
 
     offers: Offers = field(default_factory=Offers)
     limits: ServerLimits = field(default_factory=ServerLimits)
+    for_many: bool = False
 
 
 class _Environment(msgspec.Struct, forbid_unknown_fields=True):
@@ -98,7 +100,7 @@ def read_settings(path: Path) -> ServerSettings:
         ),
         tuple(settings.agents.items()),
     )
-    return ServerSettings(offers, settings.limits)
+    return ServerSettings(offers, settings.limits, for_many="limits" in document)
 
 
 def _require_room_for_others(limits: ServerLimits) -> None:

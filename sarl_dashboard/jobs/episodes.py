@@ -204,7 +204,7 @@ def take_up_work(place: Place[EpisodeBatch], rows: Sequence[Row]) -> None:
     keys = {row.key for row in rows}
     for job in (*queue().running, *queue().waiting):
         batch = job.result
-        if not isinstance(batch, EpisodeBatch) or not (job.running and job.is_own_or_left):
+        if not isinstance(batch, EpisodeBatch) or not (job.running and job.is_own):
             continue
         if keys & {row.key for row in batch.rows}:
             place.take_up(job)

@@ -118,10 +118,9 @@ class Job(Generic[Result]):
             return False
 
     @property
-    def is_own_or_left(self) -> bool:
-        """Whether this visitor may look at it and call it off, from another page too."""
-        mine = self.visitor == session.visitor()
-        return self.author == library.author() and (mine or self.is_left)
+    def is_own(self) -> bool:
+        """Whether this visitor began it, and so may call it off, from another page too."""
+        return self.visitor == session.visitor()
 
     def take_over(self) -> None:
         """Let it belong to the visitor whose page this is."""
@@ -216,7 +215,7 @@ class Place(Generic[Result]):
             return False
         for job in (*queue().running, *queue().waiting):
             here = (job.place, job.key) == (self.name, key)
-            if here and job.running and job.is_own_or_left:
+            if here and job.running and job.is_own:
                 self.take_up(job)
                 return True
         return False

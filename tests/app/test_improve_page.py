@@ -21,6 +21,7 @@ from sarl_core.improving.gaps import gaps_so_far
 from sarl_core.improving.plan import Plan
 from sarl_core.mining.language import share_text
 from sarl_core.mining.rules import Thresholds
+from sarl_dashboard import session
 from sarl_dashboard.views.improve.order import command_for
 from tests.app.screens import errors, metrics, open_page, shown_and_further, texts
 
@@ -47,6 +48,10 @@ def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def keys(app: AppTest) -> list[str | None]:
     return [button.key for button in app.button]
+
+
+def shown_work(app: AppTest) -> str:
+    return " ".join(bar.proto.text for bar in app.get("progress"))
 
 
 def finished(app: AppTest) -> AppTest:
@@ -330,12 +335,21 @@ def test_a_cancel_before_the_first_round_keeps_nothing_and_says_so() -> None:
     assert not app.dataframe
 
 
-def test_one_visitor_cannot_hold_improve_for_all() -> None:
+def test_one_visitor_cannot_hold_improve_for_all(monkeypatch: pytest.MonkeyPatch) -> None:
     first = open_page("improve", data="cartpole", rounds="200", max_rules="5")
     first.button(key="run_improve").click().run()
-    second = open_page("improve", data="cartpole", expert="nobody", round_episodes="2")
-    second.button(key="run_improve").click().run()
-    assert "have no rule" in texts(finished(second))
+    with monkeypatch.context() as elsewhere:
+        elsewhere.setattr(session, "visitor", lambda: "another")
+        second = open_page("improve", data="cartpole", expert="nobody", round_episodes="2")
+        second.button(key="run_improve").click().run()
+        assert "have no rule" in texts(finished(second))
+        # The work of others is seen on Library, and not called off there.
+        library = open_page("library")
+        assert "**Improve.**" in shown_work(library)
+        assert "who alone can cancel it" in texts(library)
+        assert not [key for key in keys(library) if str(key).startswith("cancel_job")]
+    library = open_page("library")
+    assert [key for key in keys(library) if str(key).startswith("cancel_job")]
     assert "cancel_improve" in keys(first.run())  # which goes on
     first.button(key="cancel_improve").click().run()
     finished(first)

@@ -16,6 +16,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
+from sarl_core.serving.limits import VARIABLE, ServerLimits
+
 ROOT = Path(__file__).parents[2]
 CHROMIUM = "/usr/bin/chromium"
 ARGUMENTS = [
@@ -51,6 +53,8 @@ def dashboard(folder: Path, **variables: str) -> Iterator[str]:
     log = folder / "log.txt"
     # A library of its own: what other tests of this process keep would be there again.
     own = {"HOME": str(folder), "SARL_LIBRARY": str(folder / "library")}
+    # And each test a visitor of its own, whom the work that another test left does not keep back.
+    own[VARIABLE] = ServerLimits().to_text()
     with log.open("wb") as out:
         server = subprocess.Popen(
             [sys.executable, "-m", "streamlit", "run", "app.py", "--server.port", str(port)],

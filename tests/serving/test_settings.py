@@ -38,6 +38,11 @@ def test_limits_that_are_not_named_stay_as_they_are(
     assert ServerLimits.of_process() == limits
 
 
+def test_a_file_that_names_limits_is_for_many(tmp_path: Path) -> None:
+    assert read_settings(written(tmp_path, "[limits]")).for_many
+    assert not read_settings(written(tmp_path, "[agents]")).for_many
+
+
 def test_limits_are_the_usual_ones_where_nobody_says_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

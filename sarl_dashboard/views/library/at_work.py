@@ -65,7 +65,12 @@ def _line(job: Job[Any]) -> None:
     with st.container(horizontal=True, vertical_alignment="center"):
         st.progress(job.share, f"**{escaped(job.page)}.** {escaped(job.text)}", width=_PROGRESS)
         _open(job.address, f"open_job_{name}")
-        st.button("Cancel", icon=":material/close:", key=f"cancel_job_{name}", on_click=job.cancel)
+        if job.is_own:
+            st.button(
+                "Cancel", icon=":material/close:", key=f"cancel_job_{name}", on_click=job.cancel
+            )
+        else:
+            st.caption("Another visitor began it, who alone can cancel it.", width="content")
 
 
 def _ended_line(record: EndedJob, place: int) -> None:
