@@ -122,10 +122,14 @@ class Job(Generic[Result]):
         """Whether this visitor began it, and so may call it off, from another page too."""
         return self.visitor == session.visitor()
 
+    @property
+    def is_here(self) -> bool:
+        """Whether it belongs to this very page: begun here, or left elsewhere and taken up here."""
+        return self._session == _this_session()
+
     def take_over(self) -> None:
-        """Let it belong to the visitor whose page this is."""
-        context = get_script_run_ctx()
-        self._session = context.session_id if context is not None else ""
+        """Let it belong to the page that asks."""
+        self._session = _this_session()
         self._seen = time.monotonic()
 
     def wanted(self) -> bool:
@@ -196,14 +200,18 @@ class Place(Generic[Result]):
         return job is not None and (job.running or bool(self.gathering and job.stopping))
 
     def begin(self, start: Callable[[], Job[Result]]) -> None:
-        """Begin work in the place of the one before, which is called off; for a callback too."""
-        if self.job is not None:
+        """Begin work in the place of the one before, which is called off; for a callback too.
+
+        What another page is still about was only looked at here, and goes on.
+        """
+        if self.job is not None and self.job.is_here:
             self.job.cancel()
-        job = st.session_state[f"_job_{self.name}"] = start()
+        job = start()
         job.place = self.name
+        self._look_at(job)
 
     def find_again(self, key: object) -> bool:
-        """Look at work that was begun here and left, where nothing was begun since.
+        """Look at work that this visitor began here in another page, where none was begun since.
 
         Args:
             key: Of what is looked at; None where that alone does not tell which work is about it.
@@ -221,6 +229,15 @@ class Place(Generic[Result]):
         return False
 
     def take_up(self, job: Job[Result]) -> None:
-        """Look at work that another page began and left."""
-        job.take_over()
-        self.begin(lambda: job)
+        """Look at work of this visitor that another page began, and may have left."""
+        if job.is_left:
+            job.take_over()
+        self._look_at(job)
+
+    def _look_at(self, job: Job[Result]) -> None:
+        st.session_state[f"_job_{self.name}"] = job
+
+
+def _this_session() -> str:
+    context = get_script_run_ctx()
+    return context.session_id if context is not None else ""

@@ -38,3 +38,39 @@ def test_a_page_finds_the_work_that_it_is_about_and_no_other(
         assert begun[0].running
     finally:
         end.set()
+
+
+def test_another_tab_that_begins_work_lets_that_of_the_first_go_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    end = Event()
+    tabs: dict[str, dict[str, Any]] = {name: {} for name in ("closed", "first", "second")}
+    place = Place[Any]("two_tabs")
+
+    def open_tab(name: str) -> None:
+        monkeypatch.setattr(module.st, "session_state", tabs[name])
+        monkeypatch.setattr(module, "_this_session", lambda: name)
+
+    def begin(key: str) -> Job[Any]:
+        place.begin(lambda: Job(key, lambda _: end.wait(30), 1, lasts=True))
+        assert place.job is not None
+        return place.job
+
+    monkeypatch.setattr(Job, "is_left", property(lambda job: job._session == "closed"))
+    try:
+        open_tab("closed")
+        work = begin("long")
+        for name in ("first", "second"):  # the first takes it up, the second only looks
+            open_tab(name)
+            assert place.find_again("long")
+            assert place.job is work
+            assert work.is_here == (name == "first")
+        other = begin("other")
+        assert work.running
+        open_tab("first")
+        another = begin("another")  # in its own place
+        assert work.cancelled
+        assert other.running
+        assert another.running
+    finally:
+        end.set()
