@@ -11,8 +11,10 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.report.comparison import Result, results_of
+from sarl_core.explaining.report.pdf import document_to_pdf
 from sarl_core.explaining.report.report import Report, Wishes, make_report
 from sarl_core.explaining.words.sign_off import sign_off_text
+from sarl_core.mining.language import counted
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.studies.comparison import Arm, Comparison
@@ -88,6 +90,32 @@ def _make(job: Job[Report], order: ReportOrder, cache: BoundedCache[Report]) -> 
         progress=progress,
     )
     cache.put(order.key, report)
+
+
+@st.cache_resource
+def print_cache() -> BoundedCache[bytes]:
+    """Reports on paper, as PDF files, by their order's key."""
+    return BoundedCache(MOST_REPORTS)
+
+
+def printing(order: ReportOrder, report: Report) -> Job[bytes]:
+    """Print a report, which takes a browser: it takes its turn as all long work does.
+
+    Args:
+        order: What was asked for.
+        report: What came of it.
+    """
+    cache = print_cache()
+    return Job(order.key, lambda job: _print(job, order, report, cache), 1, lasts=True)
+
+
+def _print(job: Job[bytes], order: ReportOrder, report: Report, cache: BoundedCache[bytes]) -> None:
+    def progress(seconds: int, _: int) -> bool:
+        # How long it takes nobody can say, so the seconds stand in the text.
+        job.text = f"Printing for {counted(seconds, 'second')} …" if seconds else "Printing …"
+        return job.wanted()
+
+    cache.put(order.key, document_to_pdf(report.html, progress))
 
 
 def comparison_of_session(env_id: str) -> tuple[Comparison | None, str]:

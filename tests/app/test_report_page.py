@@ -3,12 +3,17 @@ from __future__ import annotations
 import base64
 import time
 from pathlib import Path
+from threading import Event
 
+import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules
 from sarl_core.cli.app import main
 from sarl_core.mining.rule_set import rules_to_json
+from sarl_core.progress import Progress
+from sarl_dashboard.jobs import report as report_jobs
+from sarl_dashboard.jobs.queue import queue
 from tests.app.screens import errors, open_page, texts, upload_rules
 
 DATA = Path(__file__).parents[2] / "data"
@@ -35,6 +40,36 @@ def shown(app: AppTest) -> str:
     return base64.b64decode(content).decode()
 
 
+def test_a_pdf_is_printed_in_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    go_on = Event()
+
+    def prints(html: str, progress: Progress) -> bytes:
+        assert "<html" in html
+        assert progress(2, 180)
+        assert go_on.wait(30)
+        return b"%PDF"
+
+    monkeypatch.setattr(report_jobs, "document_to_pdf", prints)
+    app = made(open_page("report", data="cartpole", frames="0", in_full="1"))
+    app.button(key="run_report_on_paper").click().run()
+    (job,) = queue().running or queue().waiting
+    assert (job.page, job.place, job.lasts) == ("Report", "report_on_paper", True)
+    for _ in range(300):
+        if job.text == "Printing for 2 seconds …":
+            break
+        time.sleep(0.1)
+    assert "cancel_report_on_paper" in [button.key for button in app.run().button]
+    assert job.text in [bar.proto.text for bar in app.get("progress")]
+    go_on.set()
+    for _ in range(300):
+        if not job.running:
+            break
+        time.sleep(0.1)
+    labels = [button.label for button in app.run().get("download_button")]
+    assert "Download as PDF" in labels
+    assert "run_report_on_paper" not in [button.key for button in app.button]
+
+
 def test_the_report_is_the_one_of_the_command_that_stands_in_it(tmp_path, monkeypatch) -> None:
     app = open_page("report", data="cartpole", frames="1")
     assert not errors(app)
@@ -43,7 +78,7 @@ def test_the_report_is_the_one_of_the_command_that_stands_in_it(tmp_path, monkey
     html = shown(made(app))
     assert app.button(key="run_report").disabled
     labels = [button.label for button in app.get("download_button")]
-    assert labels[:2] == ["Download the report", "Download the slides"]
+    assert labels == ["Download the report", "Download the slides"]
     monkeypatch.chdir(tmp_path)
     (tmp_path / "data").symlink_to(DATA)
     cart = "data/demonstrations/cartpole.parquet"

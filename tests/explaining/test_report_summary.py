@@ -17,8 +17,10 @@ from sarl_core import Demonstrations, InputError, WorkError, load_demonstrations
 from sarl_core.explaining.report.comparison import read_results
 from sarl_core.explaining.report.cover import Cover, logo_of, read_logo
 from sarl_core.explaining.report.outcomes import pairs_of
+from sarl_core.explaining.report.pdf import document_to_pdf
 from sarl_core.explaining.report.report import Report, make_report
 from sarl_core.explaining.report.slides import BESIDE_RULES
+from sarl_core.progress import CancelledError
 
 ROOT = Path(__file__).parents[2]
 CSV = ROOT / "docs" / "reports" / "cartpole.csv"
@@ -226,6 +228,11 @@ def test_a_report_is_printed(cart: Demonstrations, tmp_path: Path) -> None:
     cover = Cover(title="x" * 120, author="Ada", notes="word " * 80, signers=signers)
     reported(cart, comparison=read_results(CSV), cover=cover).save(path)
     assert path.read_bytes().startswith(b"%PDF")
+
+
+def test_printing_ends_with_who_wants_it() -> None:
+    with pytest.raises(CancelledError):
+        document_to_pdf("<!doctype html><title>x</title>", lambda done, total: done > total)
 
 
 def test_without_a_browser_a_pdf_is_refused_and_nothing_is_written(

@@ -4,26 +4,33 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
+import time
+from contextlib import suppress
 from pathlib import Path
 
 from sarl_core.explaining.figures.png import without_browser
+from sarl_core.progress import Progress, report
 
 _PATIENCE = 180  # seconds; of large reports with many pictures a slow machine needs some
+_LOOKED_EVERY = 0.25  # seconds
 _WHAT = "the PDF could not be printed"
 _ADVICE = "write .html and print it from a browser"
 
 
-def document_to_pdf(html: str) -> bytes:
+def document_to_pdf(html: str, progress: Progress | None = None) -> bytes:
     """Print a document that opens by itself.
 
     Args:
         html: The document, with its style for paper.
+        progress: Called with the seconds that it has taken and those after which it is given up;
+            returning False stops.
 
     Returns:
         A PDF file.
 
     Raises:
         WorkError: If there is no Chromium or Chrome to print it with.
+        CancelledError: If the caller wants no more.
     """
     try:
         from choreographer.browsers.chromium import Chromium
@@ -31,7 +38,7 @@ def document_to_pdf(html: str) -> bytes:
         browser = Chromium.find_browser(skip_local=False)
         if browser is None:
             raise FileNotFoundError
-        return _printed(browser, html)
+        return _printed(browser, html, progress)
     except (ImportError, OSError, subprocess.SubprocessError) as error:
         raise without_browser(error, _WHAT, _ADVICE) from error
 
@@ -46,7 +53,7 @@ def can_print() -> bool:
     return browser is not None and Path(browser).is_file()
 
 
-def _printed(browser: str, html: str) -> bytes:
+def _printed(browser: str, html: str, progress: Progress | None) -> bytes:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         page, printed = Path(folder, "report.html"), Path(folder, "report.pdf")
         page.write_text(html, encoding="utf-8", newline="\n")
@@ -61,5 +68,24 @@ def _printed(browser: str, html: str) -> bytes:
             f"--print-to-pdf={printed}",
             page.as_uri(),
         )
-        subprocess.run([browser, *arguments], check=True, capture_output=True, timeout=_PATIENCE)
+        _run([browser, *arguments], progress)
         return printed.read_bytes()
+
+
+def _run(command: list[str], progress: Progress | None) -> None:
+    """Run a program to its end, which is its own or the caller's."""
+    began = time.monotonic()
+    quiet = subprocess.DEVNULL
+    with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet) as process:
+        try:
+            while process.poll() is None:
+                seconds = time.monotonic() - began
+                if seconds > _PATIENCE:
+                    raise subprocess.TimeoutExpired(command, _PATIENCE)
+                report(progress, int(seconds), _PATIENCE)
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(_LOOKED_EVERY)
+        finally:
+            process.kill()  # nothing, where it has ended; its own processes go with it
+    if process.returncode:
+        raise subprocess.CalledProcessError(process.returncode, command)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+from functools import partial
 
 import streamlit as st
 
@@ -14,10 +15,11 @@ from sarl_dashboard.components.downloads import download
 from sarl_dashboard.components.keeping import keep_result_button
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Place
-from sarl_dashboard.jobs.report import ReportOrder, report_cache, reporting
+from sarl_dashboard.jobs.report import ReportOrder, print_cache, printing, report_cache, reporting
 from sarl_dashboard.text import escaped
 
 PLACE = Place[Report]("report")
+PRINTED = Place[bytes]("report_on_paper")
 PREVIEW = 900  # pixels
 
 
@@ -47,18 +49,19 @@ def report_of(order: ReportOrder, name: str) -> None:
         )
         if order.wishes.sign_off is not None:
             st.caption(escaped(sign_off_text(order.wishes.sign_off)))
-        if report is not None and not at_work:
-            show(report, name)
-        elif not at_work and not order.comparison:
+        if report is None and not at_work and not order.comparison:
             st.markdown(
                 ":material/info: :gray[A report says more with results in it: run agents with the "
                 "rules and without on the page Measure first, and come back.]"
             )
 
     watched(PLACE, outcome)
+    report = report_cache().get(order.key)
+    if report is not None and not PLACE.at_work:
+        show(order, report, name)
 
 
-def show(report: Report, name: str) -> None:
+def show(order: ReportOrder, report: Report, name: str) -> None:
     """The report itself."""
     content = report.html.encode()
     if report.without:
@@ -66,8 +69,6 @@ def show(report: Report, name: str) -> None:
     with st.container(horizontal=True, vertical_alignment="center"):
         download("Download the report", content, f"report-{name}.html", key="report_file")
         download("Download the slides", lambda: report.slides, f"slides-{name}.html", key="slides")
-        if can_print():
-            download("Download as PDF", lambda: report.pdf, f"report-{name}.pdf", key="report_pdf")
         keep_result_button(content, f"report-{name}.html", key="keep_report")
         st.caption(
             f"One HTML file of {len(content) / 1e6:.1f} MB with "
@@ -75,9 +76,32 @@ def show(report: Report, name: str) -> None:
             "and prints on A4; the slides hold one rule each.",
             width="content",
         )
+    if can_print():
+        watched(PRINTED, partial(_on_paper, order, report, name))
     # As an address of its own the file has no access to this page, whatever names are in it.
     st.iframe(
         f"data:text/html;base64,{base64.b64encode(content).decode('ascii')}",
         height=PREVIEW,
         alt="The report as it looks in a browser",
+    )
+
+
+def _on_paper(order: ReportOrder, report: Report, name: str, at_work: bool) -> None:
+    """The report as a PDF, or the button that prints it."""
+    printed = print_cache().get(order.key)
+    if printed is not None and not at_work:
+        download("Download as PDF", printed, f"report-{name}.pdf", key="report_pdf")
+        return
+    run_bar(
+        PRINTED,
+        Offer(
+            key=order.key,
+            start=lambda: printing(order, report),
+            about="For paper: a browser on the server prints it.",
+            complete=False,
+            cancelled="Cancelled; nothing was kept.",
+            label="Make the PDF",
+            icon=":material/print:",
+            type="secondary",
+        ),
     )
