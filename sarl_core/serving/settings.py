@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -79,7 +80,7 @@ def read_settings(path: Path) -> ServerSettings:
             document = parse_json(content)
             text = content.decode()
         settings = conformed(document, _Settings)
-        _require_room_for_others(settings.limits)
+        limits = _with_room_for_others(settings.limits, document)
     except MisfitError as error:
         line = _line_of(text, error)
         where = f"{path}, line {line}" if line else f"{path}"
@@ -100,17 +101,23 @@ def read_settings(path: Path) -> ServerSettings:
         ),
         tuple(settings.agents.items()),
     )
-    return ServerSettings(offers, settings.limits, for_many="limits" in document)
+    return ServerSettings(offers, limits, for_many="limits" in document)
 
 
-def _require_room_for_others(limits: ServerLimits) -> None:
-    """One visitor alone must not be able to hold all there is."""
-    if limits.jobs_each >= limits.jobs > 1:
-        raise MisfitError(
-            f"'jobs_each' is {limits.jobs_each} and 'jobs' is {limits.jobs}, so one visitor could "
-            "hold all of them",
-            "limits",
-        )
+def _with_room_for_others(limits: ServerLimits, document: Mapping[str, Any]) -> ServerLimits:
+    """Limits by which one visitor alone cannot hold all there is.
+
+    Where `jobs_each` is not said it is the usual one, or as many as leave a place.
+    """
+    if limits.jobs_each < limits.jobs or limits.jobs == 1:
+        return limits
+    if "jobs_each" not in document["limits"]:
+        return msgspec.structs.replace(limits, jobs_each=limits.jobs - 1)
+    raise MisfitError(
+        f"'jobs_each' is {limits.jobs_each} and 'jobs' is {limits.jobs}; so that one visitor "
+        "cannot hold all of them, 'jobs_each' has to be less",
+        "limits",
+    )
 
 
 def _line_of(text: str, error: MisfitError) -> int:

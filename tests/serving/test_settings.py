@@ -38,6 +38,12 @@ def test_limits_that_are_not_named_stay_as_they_are(
     assert ServerLimits.of_process() == limits
 
 
+@pytest.mark.parametrize(("jobs", "each"), [(1, 3), (2, 1), (3, 2), (4, 3), (60, 3)])
+def test_jobs_alone_leave_a_place_for_others(tmp_path: Path, jobs: int, each: int) -> None:
+    limits = read_settings(written(tmp_path, f"[limits]\njobs = {jobs}")).limits
+    assert (limits.jobs, limits.jobs_each) == (jobs, each)
+
+
 def test_a_file_that_names_limits_is_for_many(tmp_path: Path) -> None:
     assert read_settings(written(tmp_path, "[limits]")).for_many
     assert not read_settings(written(tmp_path, "[agents]")).for_many
@@ -61,6 +67,7 @@ def test_limits_are_the_usual_ones_where_nobody_says_others(
         ("[limits]\njobs = 0", "line 2: 'jobs' is 0, not a whole number from 1 to 1000"),
         ("[limits]\nmemory_gib = -1", "line 2: 'memory_gib' is -1"),
         ("[limits]\njobs = 2\njobs_each = 2", "line 3: 'jobs_each' is 2 and 'jobs' is 2"),
+        ("[limits]\njobs_each = 7", "line 2: 'jobs_each' is 7 and 'jobs' is 6"),
         ("[[environments]]\nid = 'A-v0'\n[[environments]]\nid = 3", "line 4: 'id' is 3"),
         ("[limits]\njobs = 2\njobs = 3\n", "line 3"),
         ("limits = 3", "line 1: 'limits' is 3"),
