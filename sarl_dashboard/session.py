@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import gc
 import os
+import time
 from contextlib import suppress
 from ipaddress import ip_address
+from threading import Lock
 from typing import NoReturn
 from urllib.parse import urlsplit
 
@@ -125,14 +127,31 @@ def _is_own_machine(name: str) -> bool:
 # --- what it takes ------------------------------------------------------------------------------
 
 
+_MEASURED_EVERY = 2.0  # seconds: to look at a process takes about 10 ms, and many wait to know
+_MEASURING = Lock()
+_measured: tuple[float, int] | None = None  # when, and bytes
+
+
 def memory_used() -> int:
-    """Bytes that the server and its processes take."""
-    server = psutil.Process()
-    total = 0
-    for process in (server, *server.children(recursive=True)):
-        with suppress(psutil.Error):  # gone meanwhile
-            total += process.memory_info().rss
-    return total
+    """Bytes that the server and its processes take, as of a moment ago."""
+    global _measured
+    with _MEASURING:
+        now = time.monotonic()
+        if _measured is None or now - _measured[0] > _MEASURED_EVERY:
+            server = psutil.Process()
+            processes = (server, *server.children(recursive=True))
+            _measured = (now, sum(_taken_by(process) for process in processes))
+        return _measured[1]
+
+
+def _taken_by(process: psutil.Process) -> int:
+    """Bytes, of what it shares with others its part; where the system does not say that, all."""
+    with suppress(psutil.Error):  # gone meanwhile
+        if psutil.LINUX:
+            with suppress(psutil.AccessDenied):
+                return int(process.memory_full_info().pss)
+        return int(process.memory_info().rss)
+    return 0
 
 
 # --- how it looks ------------------------------------------------------------------------------

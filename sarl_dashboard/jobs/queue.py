@@ -110,8 +110,9 @@ class JobQueue:
             job: That has entered.
         """
         limits = ServerLimits.of_process()
+        shortage = memory_shortage()  # before the lock: to look takes its time
         with self._lock:
-            said = _obstacle(job, self._waiting, self._running, limits)
+            said = _obstacle(job, self._waiting, self._running, limits, shortage)
             if not said:
                 self._waiting.remove(job)
                 self._running.append(job)
@@ -153,6 +154,7 @@ def _obstacle(
     waiting: Sequence[Job[Any]],
     running: Sequence[Job[Any]],
     limits: ServerLimits,
+    shortage: str,
 ) -> str:
     """Why work cannot begin yet: which limit, who has reached it, and when there is room."""
     own = [other for other in running if other.visitor == job.visitor]
@@ -179,7 +181,7 @@ def _obstacle(
             "server takes",
             alike,
         )
-    if shortage := memory_shortage():
+    if shortage:
         whose = f"{counted(len(running), 'job')}: {_whose(running, job)}" if running else "by pages"
         return _sentence(f"{ahead}{shortage} ({whose}); this begins when it is less", running)
     return f"Waiting: {ahead[:-2]}" if before else ""

@@ -6,12 +6,14 @@ import time
 from types import SimpleNamespace
 from typing import Any
 
+import psutil
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core.errors import WorkError
 from sarl_core.serving.limits import VARIABLE, ServerLimits
+from sarl_dashboard import session
 from sarl_dashboard.jobs import queue as module
 from sarl_dashboard.jobs.queue import MOST_WAITING, JobKind, JobQueue
 
@@ -102,6 +104,52 @@ def test_nothing_begins_while_memory_is_short(monkeypatch: pytest.MonkeyPatch) -
     assert "uses 2.0 of the 1 GiB that it may (by pages); this begins when it is less" in said
     monkeypatch.setattr(module, "memory_used", lambda: 2**29)
     assert queue.obstacle(queue.waiting[0]) == ""
+
+
+def test_nobody_waits_for_the_lock_while_memory_is_looked_at(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv(VARIABLE, ServerLimits(memory_gib=1.0).to_text())
+    queue = JobQueue()
+    locked: list[bool] = []
+
+    def looked_at() -> int:
+        locked.append(queue._lock.locked())
+        return 0
+
+    monkeypatch.setattr(module, "memory_used", looked_at)
+    assert begun(queue, work("Ada")) == [""]
+    assert locked == [False]
+
+
+def test_what_processes_share_counts_once_and_not_at_every_look(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looks = []
+
+    def looked_at() -> Any:
+        looks.append(True)
+        process = SimpleNamespace(
+            memory_full_info=lambda: SimpleNamespace(pss=5),
+            memory_info=lambda: SimpleNamespace(rss=9),
+            children=lambda recursive: [gone, hidden],
+        )
+
+        def fails(error: type[psutil.Error]) -> Any:
+            raise error(1)
+
+        gone = SimpleNamespace(memory_full_info=lambda: fails(psutil.NoSuchProcess))
+        hidden = SimpleNamespace(
+            memory_full_info=lambda: fails(psutil.AccessDenied),
+            memory_info=lambda: SimpleNamespace(rss=100),
+        )
+        return process
+
+    monkeypatch.setattr(session, "_measured", None)
+    monkeypatch.setattr(session.psutil, "Process", looked_at)
+    monkeypatch.setattr(session.psutil, "LINUX", True)
+    assert session.memory_used() == session.memory_used() == 105
+    assert len(looks) == 1
 
 
 def test_nobody_lets_any_number_wait() -> None:
