@@ -11,7 +11,12 @@ from sarl_dashboard.components.journey.brand import ICON, show_logo
 from sarl_dashboard.components.journey.first_run import show_first_run, take_up
 from sarl_dashboard.components.journey.growing import require_trees
 from sarl_dashboard.components.journey.next_step import next_step
-from sarl_dashboard.components.journey.sign_in import is_admitted, show_sign_in, show_signed_in
+from sarl_dashboard.components.journey.sign_in import (
+    is_admitted,
+    link_before_sign_in,
+    show_sign_in,
+    show_signed_in,
+)
 from sarl_dashboard.components.journey.words import words_button
 from sarl_dashboard.components.sidebar import (
     require_data,
@@ -102,8 +107,11 @@ page = st.navigation(
 if not admitted:
     st.html(style_sheet())
     show_logo()
-    show_sign_in()
+    show_sign_in(page.url_path)
     st.stop()
+if page is PAGES[0] and not st.query_params and (link := link_before_sign_in()):
+    wanted = next(other for other in (*PAGES, *aliases) if other.url_path == link.page)
+    st.switch_page(wanted, query_params=link.query)
 if page in aliases:
     meant = next(other for other in PAGES if other.title == page.title)
     st.switch_page(meant, query_params=st.query_params.to_dict())

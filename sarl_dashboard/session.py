@@ -6,6 +6,7 @@ import gc
 import os
 import time
 from contextlib import suppress
+from hashlib import sha256
 from ipaddress import ip_address
 from threading import Lock
 from typing import NoReturn
@@ -54,34 +55,51 @@ def is_signed_in() -> bool:
 
 
 def signed_in() -> str:
-    """The name of who has signed in, or the address; "" where nobody has, or there is neither.
+    """What tells who has signed in, in words: "" where nobody has, or there is nothing to say.
 
-    What is kept is theirs by this. Two people of one name are told apart by their addresses, and
-    nobody can take a name that holds somebody's address.
+    What is kept is theirs by this. An address counts where who vouches for them says that it was
+    verified; two people of one name are told apart by their addresses, or else their accounts. So
+    nobody can take a name that holds somebody's address or account.
     """
     if get_script_run_ctx() is None or not is_signed_in():
         return ""
-    said = (str(st.user.get(key) or "").strip() for key in ("name", "email"))
-    unwanted = str.maketrans("", "", "<>")
-    name, email = ("".join(filter(str.isprintable, text)).translate(unwanted) for text in said)
-    if not email:
-        return name.replace("@", " at ")[:_LONGEST_NAME]  # or it could be somebody's address
-    if not name:
-        return email[:_LONGEST_NAME]
-    return f"{name[: _LONGEST_NAME - len(email) - 3]} <{email}>"
+    name, email = _said("name"), _said("email")
+    if email and str(st.user.get("email_verified")).lower() == "true":  # a text with some
+        return _with_mark(name, f"<{email}>") if name else email[:_LONGEST_NAME]
+    named = (name or email).replace("@", " at ")  # or it could be somebody's address
+    account = _account()
+    if not (named and account):
+        return ""
+    return _with_mark(named, f"(account {sha256(account.encode()).hexdigest()[:12]})")
+
+
+def _said(key: str) -> str:
+    """A text of who vouches for the visitor, in signs that cannot be taken for others."""
+    text = str(st.user.get(key) or "").strip().translate(str.maketrans("", "", "<>"))
+    return "".join(filter(str.isprintable, text))
+
+
+def _with_mark(name: str, mark: str) -> str:
+    return f"{name[: _LONGEST_NAME - len(mark) - 1]} {mark}"
+
+
+def _account() -> str:
+    """What stays the same of an account whatever its holder is called; "" where it is not said."""
+    subject = str(st.user.get("sub") or "")
+    return f"{st.user.get('iss') or ''} {subject}" if subject else ""
 
 
 def visitor() -> str:
     """What tells visitors apart: whose work is whose, and what each may have.
 
-    Who has signed in; else the browser, or on a server for one person nothing at all.
+    The account that has signed in; else the browser, or on a server for one person nothing at all.
     """
     context = get_script_run_ctx()
     if context is None:
         return ""
     if is_signed_in():
-        return signed_in()
-    return _ONLY_ONE if serves_one() else _browser() or context.session_id
+        return _account() or signed_in()
+    return _ONLY_ONE if serves_one() else browser() or context.session_id
 
 
 def serves_one() -> bool:
@@ -100,7 +118,7 @@ def serves_one() -> bool:
     )
 
 
-def _browser() -> str:
+def browser() -> str:
     """What tells browsers apart; "" where one takes no cookies.
 
     All pages of a browser have this token, until it is closed. As text it is another at every page.

@@ -30,7 +30,7 @@ def _signed(claims: Mapping[str, Any]) -> str:
 
 
 @contextmanager
-def identity_provider(people: Mapping[str, Mapping[str, str]]) -> Iterator[str]:
+def identity_provider(people: Mapping[str, Mapping[str, object]]) -> Iterator[str]:
     """Serve on a free port.
 
     Args:

@@ -17,8 +17,9 @@ from tests.browser.identity import identity_provider, secrets_text
 from tests.browser.walking import no_trace, visit
 
 PEOPLE = {
-    "ada": {"name": "Ada <bob@example.org>", "email": "ada@example.org"},
-    "bob": {"name": "", "email": "bob@example.org"},
+    "ada": {"name": "Ada <bob@example.org>", "email": "ada@example.org", "email_verified": True},
+    "bob": {"name": "", "email": "bob@example.org", "email_verified": True},
+    "eve": {"name": "Eve", "email": "bob@example.org", "email_verified": False},
     "nobody": {},
 }
 LIMITS = ServerLimits(jobs=2, jobs_each=1)
@@ -44,7 +45,7 @@ def signed_in(chromium: Browser, server: str, person: str) -> Page:
     context = chromium.new_context(base_url=server, viewport={"width": 1440, "height": 900})
     page = context.new_page()
     page.set_default_timeout(PATIENCE)
-    page.goto("/library")
+    page.goto("/library?data=cartpole")
     expect(page.get_by_role("heading", name="Sign in", level=1)).to_be_visible()
     assert page.get_by_role("link", name="Library").count() == 0
     page.get_by_role("button", name="Sign in").click()
@@ -86,6 +87,16 @@ def test_two_people_have_work_and_things_of_their_own(chromium: Browser, server:
     for page in (other, bob):
         no_trace(page)
         page.context.close()
+
+
+def test_signing_in_leads_to_the_link_and_an_unverified_address_is_nobodys(
+    chromium: Browser, server: str
+) -> None:
+    page = signed_in(chromium, server, "eve")
+    expect(page.get_by_role("heading", name="Library", level=1)).to_be_visible()
+    expect(page).to_have_url(f"{server}/library?data=cartpole")
+    expect(page.get_by_text(re.compile(r"Signed in as Eve \(account \w{12}\)"))).to_be_visible()
+    page.context.close()
 
 
 def test_who_signs_in_without_a_name_is_told(chromium: Browser, server: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,6 +12,15 @@ from streamlit.web.server.starlette.starlette_app_utils import generate_xsrf_tok
 from sarl_core.serving.limits import VARIABLE, ServerLimits
 from sarl_dashboard import session
 from sarl_dashboard.components.journey import sign_in
+
+VERIFIED = {"email_verified": True}
+
+
+class QueryParameters(dict[str, list[str]]):
+    """As Streamlit has them."""
+
+    def get_all(self, name: str) -> list[str]:
+        return self[name]
 
 
 class Visitor(dict[str, Any]):
@@ -39,11 +49,62 @@ def test_nobody_takes_an_address_by_being_called_so(
     monkeypatch: pytest.MonkeyPatch, said: dict[str, str]
 ) -> None:
     known = {
-        name_of(monkeypatch, email="bob@example.org"),
-        name_of(monkeypatch, name="Bob", email="bob@example.org"),
+        name_of(monkeypatch, email="bob@example.org", **VERIFIED),
+        name_of(monkeypatch, name="Bob", email="bob@example.org", **VERIFIED),
     }
     assert known == {"bob@example.org", "Bob <bob@example.org>"}
-    assert name_of(monkeypatch, **said) not in {"", *known}
+    assert name_of(monkeypatch, **said, sub="2", **VERIFIED) not in {"", *known}
+    assert name_of(monkeypatch, **said, sub="2") not in {"", *known}
+
+
+@pytest.mark.parametrize("verified", [{}, {"email_verified": False}, {"email_verified": "false"}])
+def test_an_address_that_nobody_verified_makes_nobody_its_holder(
+    monkeypatch: pytest.MonkeyPatch, verified: dict[str, Any]
+) -> None:
+    eve = {"iss": "https://login.example.org", "email": "bob@example.org", **verified}
+    by_address, by_name = (
+        name_of(monkeypatch, **eve, **more) for more in ({"sub": "1"}, {"sub": "1", "name": "Bob"})
+    )
+    assert re.fullmatch(r"bob at example.org \(account \w{12}\)", by_address)
+    assert re.fullmatch(r"Bob \(account \w{12}\)", by_name)
+    other = name_of(monkeypatch, **eve, sub="2", name="Bob")
+    assert other != by_name  # of two Bobs each is one
+    assert name_of(monkeypatch, **eve, sub="2", name=by_name) != by_name
+    assert name_of(monkeypatch, **eve, name="Bob") == ""  # as nobody can tell which
+
+
+def test_of_an_account_that_is_called_otherwise_work_stays_its_own(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    visitors = []
+    for sub, name in (("1", "Ada Byron"), ("1", "Ada Lovelace"), ("2", "Ada Lovelace")):
+        name_of(monkeypatch, iss="https://login.example.org", sub=sub, name=name)
+        visitors.append(session.visitor())
+    assert visitors[0] == visitors[1] != visitors[2]
+
+
+def test_who_comes_back_from_signing_in_sees_what_was_wanted_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = 0.0
+    monkeypatch.setattr(sign_in.time, "monotonic", lambda: now)
+    monkeypatch.setattr(session, "is_signed_in", lambda: True)
+    monkeypatch.setattr(sign_in.st, "session_state", {})
+
+    def wanted(browser: str, **query: list[str]) -> Any:
+        monkeypatch.setattr(session, "browser", lambda: browser)
+        if query:
+            monkeypatch.setattr(sign_in.st, "query_params", QueryParameters(query))
+            sign_in._remember("rules")
+        return sign_in.link_before_sign_in
+
+    came_back = wanted("one", rule=["3", "4"])
+    assert wanted("two")() is None
+    wanted("one")
+    assert (came_back().page, came_back()) == ("rules", None)
+    came_back = wanted("one", rule=["3"])
+    now = 4000.0  # by then it is another visit
+    assert came_back() is None
 
 
 TOKEN = bytes(range(16))

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import time
+from collections import OrderedDict
 from collections.abc import Mapping
+from dataclasses import dataclass
+from threading import Lock
 
 import streamlit as st
 from streamlit.errors import StreamlitAuthError
@@ -10,14 +14,49 @@ from streamlit.errors import StreamlitAuthError
 from sarl_dashboard import session
 from sarl_dashboard.text import escaped, refuse
 
+_MOST_LINKS = 1_000  # of people who are about to sign in
+_WAITS = 3600.0  # seconds
+_LOCK = Lock()
+_LINKS: OrderedDict[str, Link] = OrderedDict()
+"""By browser: whoever vouches for visitors sends all of them to the first page."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """What somebody wanted to see before signing in.
+
+    Attributes:
+        page: Its path, "" of the first one.
+        query: What its address says.
+        since: Seconds of `time.monotonic`.
+    """
+
+    page: str
+    query: Mapping[str, list[str]]
+    since: float
+
 
 def is_admitted() -> bool:
     """Whether the pages are for this visitor: who has signed in with a name, where one has to."""
     return not session.needs_sign_in() or bool(session.signed_in())
 
 
-def show_sign_in() -> None:
-    """What stands in the place of every page until somebody has signed in."""
+def link_before_sign_in() -> Link | None:
+    """What this visitor, back from signing in, wanted to see; None where nothing, or once more."""
+    if "_page" in st.session_state or not session.is_signed_in():
+        return None  # a page was seen in this visit
+    with _LOCK:
+        link = _LINKS.pop(session.browser(), None)
+    recent = link is not None and time.monotonic() - link.since < _WAITS
+    return link if recent else None
+
+
+def show_sign_in(page: str) -> None:
+    """What stands in the place of every page until somebody has signed in.
+
+    Args:
+        page: Path of the one that is seen then.
+    """
     st.title("Sign in")
     if session.is_signed_in():
         refuse(
@@ -35,6 +74,7 @@ def show_sign_in() -> None:
             key=f"sign_in_{provider}",
         )
         if pressed:
+            _remember(page)
             _sign_in(provider)
 
 
@@ -45,6 +85,14 @@ def show_signed_in() -> None:
     with st.sidebar:
         st.caption(f"Signed in as {escaped(session.signed_in())}")
         st.button("Sign out", icon=":material/logout:", on_click=st.logout, key="sign_out")
+
+
+def _remember(page: str) -> None:
+    query = {name: st.query_params.get_all(name) for name in st.query_params}
+    with _LOCK:
+        _LINKS[session.browser()] = Link(page, query, time.monotonic())
+        while len(_LINKS) > _MOST_LINKS:
+            _LINKS.popitem(last=False)
 
 
 def _sign_in(provider: str) -> None:
