@@ -132,7 +132,7 @@ def test_looks_that_another_processor_rounds_otherwise_are_read_as_they_are():
     path = Path(__file__).parents[2] / "data" / "rules" / "lunar_lander_combined.card.json"
     document = json.loads(path.read_text())["certificate"]
     read = certificate_from(document, name="it")
-    late = len(read.test.refused) - 5
+    late = 140
     for place, by, sentence in ((late, -2, ""), (late, -40, "does not hold"), (3, 5, "does not")):
         looks = list(read.test.refused)
         looks[place] = max(looks[place] + by, looks[place - 1])

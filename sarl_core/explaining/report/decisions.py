@@ -18,7 +18,7 @@ from sarl_core.explaining.report.outcomes import (
 from sarl_core.explaining.report.rule_set_card import ReportedEpisodes
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.explaining.words.sign_off import SignOff
-from sarl_core.mining.language import counted, share_text
+from sarl_core.mining.language import counted, listed, share_text
 
 
 @dataclass(frozen=True)
@@ -81,10 +81,11 @@ def decisions(
             "It was recorded, and the rules decide without it.",
         )
     if gaps.doubts:
+        names = listed(gaps.doubts[0].names, most=4)
         more = "" if len(gaps.doubts) == 1 else " And others (section 4)."
         yield OpenQuestion(
             "Has somebody looked at the rules that deserve a second look?",
-            f"{gaps.doubts[0].text}{more}",
+            f"{gaps.doubts[0].text.removesuffix('.')} ({names}).{more}",
         )
     if sign_off is not None and not sign_off.approvals:
         yield OpenQuestion("Are the rules approved?", "Nobody has approved them yet.")

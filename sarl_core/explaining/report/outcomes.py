@@ -341,26 +341,26 @@ def certainty(pairs: Sequence[Pair], reported: ReportedEpisodes) -> Iterator[str
     numbers = sorted({pair.shielded.episodes for pair in pairs})
     episodes = " or ".join(f"{number:,}" for number in numbers)
     noun = "episode" if numbers == [1] else "episodes"
-    intervals = [text for pair in first if (text := _intervals(pair))]
+    intervals = dict.fromkeys(fact for pair in first for fact in _intervals(pair))
     rests = f"Each number above rests on {episodes} {noun}."
     if not intervals:
         yield f"{rests} Of what the rules change there is no interval."
     else:
-        yield f"{rests} 95 % intervals: {'; '.join(dict.fromkeys(intervals))}."
+        yield f"{rests} 95 % intervals: {'; '.join(intervals)}."
     if reported.mean is not None:
         yield _achieved(reported)
 
 
-def _intervals(pair: Pair) -> str:
-    """Between which ends lies what the rules did to one agent; "" where no end is known."""
-    one, facts = pair.shielded, []
+def _intervals(pair: Pair) -> Iterator[str]:
+    """Between which ends lies what the rules did to one agent, as far as it is known."""
+    one = pair.shielded
+    who = "with the rules" if pair.is_policy else f"of {one.name}"
     if is_known(one) and one.crash_ends is not None:
         low, high = map(share_text, one.crash_ends)
-        facts.append(f"failures with the rules {low} to {high}")
+        yield f"failures {who} {low} to {high}"
     if one.gained is not None:
         ends = [telling_text(end) for end in (one.gained.low, one.gained.high)]
-        facts.append(f"the mean return of {pair.agent} changes by {ends[0]} to {ends[1]}")
-    return "; ".join(facts)
+        yield f"the mean return of {pair.agent} changes by {ends[0]} to {ends[1]}"
 
 
 def failures_at_most(pairs: Sequence[Pair], reported: ReportedEpisodes) -> tuple[float, int] | None:
