@@ -219,12 +219,12 @@ def test_the_committed_results_are_whole() -> None:
         own = entry.settings.get("environments", [entry.settings.get("environment")])
         assert list(entry.inputs) == own
         for env_id in own:
-            made, there = entry.inputs[env_id], fingerprints(env_id, FULL.recordings)
+            made, there = entry.inputs[env_id], fingerprints(env_id, 1)
             assert made["experts"] == there["experts"]
+            # Of the others the numbers alone: another processor adds up a network's products in
+            # another order, and recordings made on it differ in the last bit.
             assert made["recordings"]["0"] == there["recordings"]["0"]
-            # Another processor adds up a network's products in another order, and recordings made
-            # on it differ in the last bit.
-            assert list(made["recordings"]) == list(there["recordings"])
+            assert list(made["recordings"]) == [str(number) for number in range(FULL.recordings)]
         assert all(claim.by_chance is not None for claim in entry.claims)
         if "environments" in entry.settings:
             ids = continuous() if name == "divider" else environments()
