@@ -16,11 +16,10 @@ from sarl_core.environments.environment import Environment
 from sarl_core.environments.formulas import Formula
 from sarl_core.explaining.report.comparison import Result
 from sarl_core.explaining.report.tally import Tally
-from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.mining.growing.growth import EXACT_UP_TO
 from sarl_core.mining.language import counted, threshold_text
-from sarl_core.mining.never.never_rules import mine_never_rules, with_never_rules
+from sarl_core.mining.never.never_rules import forbids_alone, mined_alike
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.mining.rules import NAMED_SETTINGS
 from sarl_core.mining.tree import PolicyTree
@@ -208,7 +207,7 @@ def _limits(rule_set: RuleSet) -> dict[str, object]:
         "--setting": named,
         "--support": None if named else threshold_text(limits.support),
         "--confidence": None
-        if named or _forbids_alone(rule_set)
+        if named or forbids_alone(rule_set)
         else threshold_text(limits.confidence),
         "--never": None if limits.never is None else threshold_text(limits.never),
         "--lift": threshold_text(limits.lift) if limits.lift else None,
@@ -264,35 +263,6 @@ def commands_that_hold(
     if not any(line.startswith(mining) for line in commands) or mined_again(rule_set, trees):
         return tuple(commands)
     return tuple(line for line in commands if not line.startswith(mining))
-
-
-def mined_alike(trees: Sequence[PolicyTree], rule_set: RuleSet) -> RuleSet:
-    """The rules of trees at the thresholds of others, and of the same kind.
-
-    Args:
-        trees: One an action dimension.
-        rule_set: Rules whose thresholds count, and whether they demand or forbid.
-
-    Returns:
-        The rules.
-    """
-    limits = rule_set.thresholds
-    if limits.never is not None and _forbids_alone(rule_set):
-        return mine_never_rules(
-            trees, epsilon=limits.never, supp_min=limits.support, max_depth=limits.max_depth
-        )
-    demanding = mine_rules(
-        trees,
-        supp_min=limits.support,
-        conf_min=limits.confidence,
-        lift_min=limits.lift,
-        max_depth=limits.max_depth,
-    )
-    return demanding if limits.never is None else with_never_rules(demanding, trees, limits.never)
-
-
-def _forbids_alone(rule_set: RuleSet) -> bool:
-    return rule_set.forbids and all(rule.forbids for rule in rule_set.rules)
 
 
 def mined_again(rule_set: RuleSet, trees: Sequence[PolicyTree] | None) -> bool:

@@ -31,7 +31,6 @@ from sarl_core.explaining.report.provenance import (
     facts,
     how_to_measure,
     mined_again,
-    mined_alike,
 )
 from sarl_core.explaining.report.rule_set_card import reported_of
 from sarl_core.explaining.report.rules import in_order, rules_part
@@ -49,6 +48,7 @@ from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.language import counted, merged_length, share_text
+from sarl_core.mining.never.never_rules import mined_alike
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import cross_fit

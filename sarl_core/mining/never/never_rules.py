@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import require
-from sarl_core.mining.algorithm_1 import conditions_to, mined_set, mined_trees
+from sarl_core.mining.algorithm_1 import conditions_to, mine_rules, mined_set, mined_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.tree import PolicyTree
@@ -130,6 +130,48 @@ def with_never_rules(rule_set: RuleSet, trees: Sequence[PolicyTree], epsilon: fl
         rules=(*rule_set.rules, *forbidding.rules),
         thresholds=replace(at, never=epsilon),
     )
+
+
+def mine_at(trees: Sequence[PolicyTree], thresholds: Thresholds, *, alone: bool = True) -> RuleSet:
+    """Mine rules of either kind.
+
+    Args:
+        trees: One an action dimension.
+        thresholds: Of rules that forbid where they have an epsilon, else of rules that demand.
+        alone: Whether rules that forbid stand alone; else behind rules that demand.
+
+    Returns:
+        The rules.
+    """
+    support, depth, epsilon = thresholds.support, thresholds.max_depth, thresholds.never
+    if epsilon is not None and alone:
+        return mine_never_rules(trees, epsilon=epsilon, supp_min=support, max_depth=depth)
+    demanding = mine_rules(
+        trees,
+        supp_min=support,
+        conf_min=thresholds.confidence,
+        lift_min=thresholds.lift,
+        max_depth=depth,
+    )
+    return demanding if epsilon is None else with_never_rules(demanding, trees, epsilon)
+
+
+def mined_alike(trees: Sequence[PolicyTree], rule_set: RuleSet) -> RuleSet:
+    """The rules of trees at the thresholds of others, and of the same kind.
+
+    Args:
+        trees: One an action dimension.
+        rule_set: Rules whose thresholds count, and whether they demand or forbid.
+
+    Returns:
+        The rules.
+    """
+    return mine_at(trees, rule_set.thresholds, alone=forbids_alone(rule_set))
+
+
+def forbids_alone(rule_set: RuleSet) -> bool:
+    """Whether all rules forbid, and there is one."""
+    return rule_set.forbids and all(rule.forbids for rule in rule_set.rules)
 
 
 def never_thresholds(

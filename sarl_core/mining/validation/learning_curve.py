@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
-from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.growing.growth import grow_policy_trees
+from sarl_core.mining.never.never_rules import mine_at
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import Learner
-from sarl_core.mining.validation.cross_fitting import judge
-from sarl_core.mining.validation.episode_counts import count_rules
+from sarl_core.mining.validation.cross_fitting import judge_pairs
 from sarl_core.processes import run_each
 from sarl_core.progress import Progress
 
@@ -84,7 +83,7 @@ def learning_curve(
 
     Args:
         demonstrations: What rules are mined from, E episodes.
-        thresholds: Of every rule set.
+        thresholds: Of every rule set; with an epsilon of rules that forbid, and no others.
         divider: Number of intervals of continuous dimensions.
         learner: What grows the trees.
         held_out: What every rule set is tried on; where not given, the episodes that come later
@@ -172,15 +171,12 @@ def curve_point(
             rest = demonstrations.select(order[size:])
     except InputError:  # an episode of a single step is no demonstration by itself
         return CurvePoint(0, 0.0, 0.0, float("nan"))
-    mined = mine_rules(
-        grow_policy_trees(some, divider=divider, learner=learner),
-        supp_min=thresholds.support,
-        conf_min=thresholds.confidence,
-        lift_min=thresholds.lift,
-        max_depth=thresholds.max_depth,
-    )
-    fidelity = float("nan")
+    mined = mine_at(grow_policy_trees(some, divider=divider, learner=learner), thresholds)
+    fidelity, coverage = float("nan"), mined.coverage
+    if mined.forbids:  # they overlap, so the pairs tell
+        here = judge_pairs(mined, some)
+        coverage = float(here.covered.sum() / here.decisions.sum())
     if rest is not None and mined.rules:
-        share = judge(mined, count_rules(mined, rest)).fidelity.share
+        share = judge_pairs(mined, rest).fidelity.share
         fidelity = fidelity if share is None else share
-    return CurvePoint(len(mined), mined.mean_length, mined.coverage, fidelity)
+    return CurvePoint(len(mined), mined.mean_length, coverage, fidelity)

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
-from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.applications import Applications, applications
 from sarl_core.mining.growing.growth import grow_policy_trees
+from sarl_core.mining.never.never_rules import mined_alike
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Operator, Rule
@@ -125,7 +125,7 @@ def rule_stability(
     """Draw as many episodes as there are, with replacement, mine again, and look for the rules.
 
     The overlap of two rules is the number of demonstrated states that both cover over the number
-    that one of them covers (Jaccard); rules with different labels have none.
+    that one of them covers (Jaccard); rules that say different things have none.
 
     Args:
         rule_set: Mined at thresholds.
@@ -226,15 +226,10 @@ def resampled(
     Returns:
         What was found.
     """
-    mined = mine_rules(
-        grow_policy_trees(
-            _drawn(demonstrations, drawn), divider=rule_set.divider, learner=rule_set.learner
-        ),
-        supp_min=rule_set.thresholds.support,
-        conf_min=rule_set.thresholds.confidence,
-        lift_min=rule_set.thresholds.lift,
-        max_depth=rule_set.thresholds.max_depth,
+    trees = grow_policy_trees(
+        _drawn(demonstrations, drawn), divider=rule_set.divider, learner=rule_set.learner
     )
+    mined = mined_alike(trees, rule_set)
     overlap, like = _most_alike(rule_set, own, mined, demonstrations)
     known: dict[int, dict[tuple[int, Operator], float]] = {}
     thresholds = np.full(len(sides), np.nan)
@@ -279,13 +274,13 @@ def _most_alike(
     if not others:
         return overlap, like
     theirs = applications(mined, demonstrations.observations)
-    dimension, label = _says(rule_set)
-    their_dimension, their_label = _says(mined)
-    # Freshly mined rules of one dimension do not overlap: a state has one of them, or none.
-    at = np.full((len(rule_set.actions), len(demonstrations)), -1, dtype=np.int64)
-    at[their_dimension[theirs.rule], theirs.row] = theirs.rule
-    met = at[dimension[own.rule], own.row]
-    same = (met >= 0) & (their_label[met] == label[own.rule])
+    says, they_say = _says(rule_set, mined)
+    # Freshly mined rules that say the same do not overlap: a state has one of them, or none.
+    kinds = 1 + max(int(one.max(initial=0)) for one in (says, they_say))
+    at = np.full((kinds, len(demonstrations)), -1, dtype=np.int64)
+    at[they_say[theirs.rule], theirs.row] = theirs.rule
+    met = at[says[own.rule], own.row]
+    same = met >= 0
     pair, shared = np.unique(own.rule[same] * others + met[same], return_counts=True)
     first, second = np.divmod(pair, others)
     size = np.bincount(own.rule, minlength=count)
@@ -297,9 +292,16 @@ def _most_alike(
     return overlap, like
 
 
-def _says(rule_set: RuleSet) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    rules = rule_set.rules
-    return (
-        np.array([rule.dimension for rule in rules], dtype=np.int64),
-        np.array([rule.action for rule in rules], dtype=np.int64),
-    )
+def _says(*rule_sets: RuleSet) -> list[NDArray[np.int64]]:
+    """What each rule demands or forbids, as a number that is the same wherever it is the same."""
+    numbers: dict[tuple[int, bool, int], int] = {}
+    return [
+        np.array(
+            [
+                numbers.setdefault((rule.dimension, bool(rule.forbids), rule.label), len(numbers))
+                for rule in rule_set.rules
+            ],
+            dtype=np.int64,
+        )
+        for rule_set in rule_sets
+    ]

@@ -10,11 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, RuleSet, grow_policy_trees, mine_rules
-from sarl_core.mining.never.never_rules import mine_never_rules, with_never_rules
+from sarl_core.mining.never.never_rules import (
+    mine_never_rules,
+    never_thresholds,
+    with_never_rules,
+)
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.validation.cross_fitting import cross_fit, judge, judge_pairs
 from sarl_core.mining.validation.episode_counts import count_rules, count_together
 from sarl_core.mining.validation.holding_out import hold_out, with_held_out
+from sarl_core.mining.validation.learning_curve import learning_curve
+from sarl_core.mining.validation.stability import rule_stability
 from sarl_core.shielding.leeway import leeway_of
 from tests.mining.strategies import labelled_states
 
@@ -86,3 +92,52 @@ def test_rules_that_demand_are_judged_alike_by_both(lander_like: Demonstrations)
         np.testing.assert_array_equal(
             getattr(fit.of(mine), name), getattr(fit.at(thresholds), name)
         )
+
+
+def test_a_learning_curve_is_of_rules_that_forbid_where_there_is_an_epsilon(lander_like):
+    curve = learning_curve(lander_like, never_thresholds(0.2, 0.05), orders=1, points=3, seed=4)
+    order = np.random.default_rng(4).permutation(np.unique(lander_like.episodes))
+    for column, size in enumerate(curve.episodes.tolist()):
+        some = lander_like.select(order[:size])
+        rules = mine_never_rules(grow_policy_trees(some), epsilon=0.2, supp_min=0.05)
+        assert curve.rules[0, column] == len(rules)
+        assert curve.coverage[0, column] == pytest.approx(leeway_of(rules, some).coverage)
+        if size < len(order):
+            judged = judge_pairs(rules, lander_like.select(order[size:]))
+            share = judged.fidelity.share
+            assert curve.fidelity[0, column] == pytest.approx(
+                np.nan if share is None else share, nan_ok=True
+            )
+
+
+def test_rules_that_forbid_come_back_as_those_that_forbid_the_same(lander_like: Demonstrations):
+    rules = mine_never_rules(lander_like, epsilon=0.2, supp_min=0.05)
+    stable = rule_stability(rules, lander_like, rounds=2, seed=1)
+    rng = np.random.default_rng(1)
+    episodes = np.unique(lander_like.episodes)
+    overlaps = np.zeros((2, len(rules)))
+    for drawn in overlaps:
+        places = rng.integers(0, len(episodes), len(episodes))
+        rows = np.concatenate([np.flatnonzero(lander_like.episodes == episodes[p]) for p in places])
+        again = mine_never_rules(
+            Demonstrations(
+                lander_like.observations[rows],
+                lander_like.actions[rows],
+                np.repeat(np.arange(len(places)), 100),
+            ),
+            epsilon=0.2,
+            supp_min=0.05,
+        )
+        for place, rule in enumerate(rules):
+            here = rule.applies(lander_like.observations)
+            drawn[place] = max(
+                (
+                    (here & there).sum() / (here | there).sum()
+                    for other in again
+                    if other.forbids == rule.forbids
+                    for there in [other.applies(lander_like.observations)]
+                ),
+                default=0.0,
+            )
+    assert [one.overlap for one in stable.rules] == pytest.approx(np.median(overlaps, axis=0))
+    assert max(one.returns for one in stable.rules) == 1.0
