@@ -7,6 +7,7 @@ from markupsafe import Markup
 
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.words.cross_fit import influence_sentences
+from sarl_core.mining.language import share_text, threshold_text
 from sarl_dashboard.components.edits_notice import without_edits_notice
 from sarl_dashboard.components.elsewhere import elsewhere_notice
 from sarl_dashboard.components.hold_out import leave_out_choice
@@ -14,8 +15,9 @@ from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.session import end_page
 from sarl_dashboard.state import rule_base
-from sarl_dashboard.state.data import all_demonstrations, require_demonstrations
-from sarl_dashboard.state.thresholds import FORBID, chosen_mode
+from sarl_dashboard.state.data import all_demonstrations, mined_data, require_demonstrations
+from sarl_dashboard.state.mined import fidelity_at
+from sarl_dashboard.state.thresholds import FORBID, chosen_epsilon, chosen_mode
 from sarl_dashboard.views.evidence.contradictions import show_contradictions
 from sarl_dashboard.views.evidence.evidence import chosen_evidence
 from sarl_dashboard.views.evidence.held_out import hold_out_choice
@@ -30,10 +32,18 @@ st.caption(
     "how many of them, each counted once because its steps are alike."
 )
 require_demonstrations()
-if chosen_mode() == FORBID:
+forbids = chosen_mode() == FORBID
+if forbids:
+    st.caption(
+        "A rule that forbids is right in a state if the expert did not do there what it forbids. "
+        f"At an epsilon of {threshold_text(chosen_epsilon())} it should be in at least "
+        f"{share_text(1.0 - chosen_epsilon())} of the states of an episode."
+    )
+if forbids and mined_data() is not None:
     st.info(
-        "This page understands rules that demand an action, and those at the thresholds forbid "
-        "one; choose rules that demand on the page Thresholds.",
+        "A mined file counts, in the episodes held out, what its rules demand, and not what they "
+        "forbid; choose rules that demand on the page Thresholds, or the demonstrations "
+        "themselves.",
         icon=":material/block:",
     )
     end_page()
@@ -60,7 +70,7 @@ else:
     if not (evidence.mined and evidence.held_out):  # what these episodes say stands above
         elsewhere_notice(
             evidence.thresholds,
-            evidence.rule_set.fidelity,
+            fidelity_at(evidence.thresholds),
             lambda judged: Markup().join(map(note, influence_sentences(judged))),
         )
 enough, curve, stability, contradictions, left_out = st.tabs(

@@ -7,6 +7,7 @@ import streamlit as st
 from sarl_dashboard.components.elsewhere import elsewhere_notice
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state.data import require_demonstrations
+from sarl_dashboard.state.mined import fidelity_at
 from sarl_dashboard.views.rules.in_force import rules_in_force
 from sarl_dashboard.views.rules.table import nothing_in_force, search_and_rules
 
@@ -17,6 +18,6 @@ if not in_force.rule_set.rules:
     nothing_in_force(in_force.thresholds)
 else:
     if not in_force.edits:
-        elsewhere_notice(in_force.thresholds, in_force.rule_set.fidelity)
+        elsewhere_notice(in_force.thresholds, fidelity_at(in_force.thresholds))
     search_and_rules(in_force)
 cross_fitting.make_ready()

@@ -35,9 +35,11 @@ def elsewhere_notice(
         more: HTML to stand below.
     """
     demonstrations = chosen_demonstrations()
-    if demonstrations is None or not rule_base.at_thresholds() or thresholds.never is not None:
+    if demonstrations is None or not rule_base.at_thresholds():
         return
     if demonstrations.sample_of is not None:
+        if thresholds.never is not None:
+            return
         _notice_of_file(demonstrations, cross_fitting.judged(thresholds), fidelity, more)
         return
     divider = chosen_divider()

@@ -12,6 +12,7 @@ from concurrent.futures import Executor
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.distributed.mined_data import MinedData
+from sarl_core.mining.never.never_rules import mine_at
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
@@ -46,12 +47,13 @@ def judged(thresholds: Thresholds) -> Judged | None:
 
     Returns:
         Of mined rules alone: a compact set was built from other states. Of a mined file what the
-        episodes say that were held out when it was mined. None of rules that forbid.
+        episodes say that were held out when it was mined, and of its rules that forbid nothing:
+        it holds too few counts for those.
     """
-    if thresholds.never is not None:
-        return None
     mined = mined_data()
     if mined is not None:
+        if thresholds.never is not None:
+            return None
         return _judged_in_file(mined, thresholds) if rule_base.at_thresholds() else None
     fit = known()
     return None if fit is None else _judged(fit, thresholds)
@@ -80,7 +82,9 @@ def _judged_in_file(mined: MinedData, thresholds: Thresholds) -> Judged | None:
 
 @cached(hash_funcs={CrossFit: _trees_of})
 def _judged(fit: CrossFit, thresholds: Thresholds) -> Judged:
-    return fit.at(thresholds)
+    if thresholds.never is None:
+        return fit.at(thresholds)
+    return fit.of(lambda trees: mine_at(trees, thresholds))
 
 
 @cached(hash_funcs={CrossFit: _trees_of})

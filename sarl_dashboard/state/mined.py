@@ -8,14 +8,13 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError
 from sarl_core.explaining.tables.rules import TopRules, top_rules
-from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.editing.renaming import renamed_trees
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.evidence import EpisodeCounts
 from sarl_core.mining.growing.growth import grow_policy_trees, learner_for
 from sarl_core.mining.never.landscape import NeverLandscape, never_landscape
-from sarl_core.mining.never.never_rules import mine_never_rules
+from sarl_core.mining.never.never_rules import mine_at
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import Landscape, threshold_landscape
@@ -129,21 +128,7 @@ def _rules_of_file(mined: MinedData, thresholds: Thresholds) -> RuleSet:
 
 @cached()
 def _mined_rules(trees: Trees, thresholds: Thresholds, parts: Parts | None) -> RuleSet:
-    if thresholds.never is not None:
-        rule_set = mine_never_rules(
-            trees,
-            epsilon=thresholds.never,
-            supp_min=thresholds.support,
-            max_depth=thresholds.max_depth,
-        )
-    else:
-        rule_set = mine_rules(
-            trees,
-            supp_min=thresholds.support,
-            conf_min=thresholds.confidence,
-            lift_min=thresholds.lift,
-            max_depth=thresholds.max_depth,
-        )
+    rule_set = mine_at(trees, thresholds)
     if parts is None or parts.mined.whole.digest != rule_set.source.digest:
         return rule_set
     boxed = with_boxes(rule_set, parts.mined)
@@ -167,6 +152,21 @@ def rules_at(thresholds: Thresholds | None = None) -> RuleSet:
         )
     trees = grown_trees(demonstrations, chosen_divider())
     return mined_rules(trees, thresholds or chosen_thresholds(), data_parts())
+
+
+def fidelity_at(thresholds: Thresholds) -> float:
+    """Fidelity of the rules at thresholds on what they were mined from.
+
+    Rules that forbid overlap, so it is counted by states: right are those in which nothing that is
+    forbidden there was done.
+    """
+    demonstrations = chosen_demonstrations()
+    if thresholds.never is None or demonstrations is None:
+        return rules_at(thresholds).fidelity
+    trees = grown_trees(demonstrations, chosen_divider())
+    support, epsilon = (thresholds.support,), (thresholds.never,)
+    point = mined_never_landscape(trees, support, epsilon, depth=thresholds.max_depth)
+    return float(point.fidelity[0, 0])
 
 
 def tried_on() -> Demonstrations | MinedData | None:

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import re
+import time
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
 from sarl_core import RuleSet, grow_policy_trees, load_demonstrations
 from sarl_core.explaining.report.provenance import mined_again, mining_command
+from sarl_core.explaining.words.cross_fit import judged_sentence
+from sarl_core.explaining.words.evidence import VERDICTS, held_out_text, verdict_counts
 from sarl_core.mining.language import share_text
 from sarl_core.mining.never.never_rules import mine_never_rules
+from sarl_core.mining.validation.cross_fitting import cross_fit, judge_pairs
+from sarl_core.mining.validation.holding_out import hold_out, with_held_out
 from sarl_core.shielding.leeway import leeway_of
 from sarl_core.shipped import DATA
 from tests.app.screens import errors, html, metrics, open_page, page_file, texts
@@ -89,7 +95,6 @@ def test_the_rules_flow_to_the_other_pages(rules: RuleSet) -> None:
     assert mined_again(rules, trees)
     assert not mined_again(replace(rules, rules=rules[1:]), trees)
     assert "Editing understands rules that demand" in texts(open_page("edit", **FORBID))
-    assert "rules that demand an action" in texts(open_page("evidence", **FORBID))
     for page in ("what_if", "episodes", "overview", "names", "export"):
         assert not errors(open_page(page, **FORBID))
 
@@ -100,3 +105,45 @@ def test_continuous_actions_are_forbidden_by_intervals() -> None:
     chosen = open_page("what_if", data="bipedal_walker", mode="forbid", divider="4")
     found = re.findall(r"Forbidden here: .*? Freedom (\d+) %", html(chosen))
     assert all(0 <= int(one) <= 100 for one in found)
+
+
+def test_evidence_says_of_held_out_episodes_what_the_command_says() -> None:
+    """The numbers of the guide: 16 rules, of which the whole interval of one lies above 90 %."""
+    app = open_page("evidence", **FORBID, holdout="0.3")
+    split = hold_out(LANDER, 0.3)
+    rules = with_held_out(mine_never_rules(split.mined, epsilon=0.1, supp_min=0.01), split.held_out)
+    counts = verdict_counts(rules.rules, 0.9)
+    assert (len(rules), counts["reached"], counts["below"]) == (16, 1, 0)
+    judged = judge_pairs(rules, split.held_out)
+    assert judged.fidelity.share is not None
+    shown = metrics(app)
+    assert shown["Held-out fidelity"] == share_text(judged.fidelity.share, decimals=1)
+    for name in ("reached", "open", "below", "unknown"):
+        assert shown[VERDICTS[name].capitalize()] == str(counts[name])
+    assert judged_sentence(judged) in html(app)
+    table = app.dataframe[0].value
+    assert table["Held out"].tolist() == [
+        held_out_text(rule.held_out) for rule in sorted(rules, key=lambda rule: -rule.samples)
+    ]
+    assert "would reach 1 − epsilon" in html(app)
+    assert "in at least 90 % of the states" in texts(app)
+    assert "minimum confidence" not in html(app) + texts(app)
+
+
+def test_all_rules_that_forbid_are_judged_in_episodes_that_they_were_not_mined_from() -> None:
+    app = open_page("evidence", data="cartpole", mode="forbid", epsilon="0.1", support="0.01")
+    shown = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")
+    mine = partial(mine_never_rules, epsilon=0.1, supp_min=0.01)
+    sentence = judged_sentence(cross_fit(shown).of(mine))
+    for _ in range(300):
+        app.run()
+        if sentence in html(app):
+            break
+        time.sleep(0.2)
+    assert sentence in html(app)
+    app.switch_page(page_file("thresholds")).run()
+    assert sentence in html(app)
+    fidelity = leeway_of(mine(shown), shown).fidelity
+    assert metrics(app)["Fidelity"] == share_text(fidelity, decimals=1)
+    deltas = {metric.label: metric.delta for metric in app.metric if metric.delta}
+    assert deltas["Fidelity"].startswith("elsewhere ")

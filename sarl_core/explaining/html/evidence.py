@@ -15,6 +15,7 @@ from sarl_core.explaining.words.evidence import (
     VERDICTS,
     evidence_text,
     held_out_interval_text,
+    least_text,
     verdict_counts,
 )
 from sarl_core.mining.action_words import says_text
@@ -91,8 +92,9 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
             [f"{tick_text(height)} %" for height in heights],
             "Confidence",
         ),
-        label=f"The confidence of {counted(len(rules), 'rule')} against the minimum confidence "
-        f"of {share_text(threshold)}, with the 95 % intervals of what was held out: {verdicts}",
+        label=f"The confidence of {counted(len(rules), 'rule')} against "
+        f"{least_text(rule_set.thresholds)}, {share_text(threshold)}, with the 95 % intervals of "
+        f"what was held out: {verdicts}",
         height=262,
         tips=[_tip(rule, rule_set) for rule in rules],
         css=f"sarl-overview{' sarl-few' * few}{' sarl-close' * (len(named) > _CLOSE)}",
@@ -115,11 +117,12 @@ def _tip(rule: Rule, rule_set: RuleSet) -> str:
     return "\n".join(line for line in lines if line)
 
 
-def enough_plot(missing: Sequence[float]) -> Markup:
-    """How many rules would reach the minimum confidence after so many more episodes.
+def enough_plot(missing: Sequence[float], least: str = "the minimum confidence") -> Markup:
+    """How many rules would reach what they have to after so many more episodes.
 
     Args:
         missing: What `more_episodes` gives of each rule; at least one.
+        least: What is to be reached, as `least_text` says it.
 
     Returns:
         HTML: episodes to the right, rules upwards, in steps.
@@ -143,7 +146,7 @@ def enough_plot(missing: Sequence[float]) -> Markup:
         Axis(across, widths, list(map(tick_text, widths)), "More episodes"),
         Axis(upwards, heights, list(map(tick_text, heights)), f"Rules that reach it, of {most:,}"),
         label=f"Of {counted(most, 'rule')} {reached[0]:,} "
-        f"{'reaches' if reached[0] == 1 else 'reach'} the minimum confidence now, and "
+        f"{'reaches' if reached[0] == 1 else 'reach'} {least} now, and "
         f"{reached[-1]:,} ({share_text(reached[-1] / most)}) after enough more episodes",
         height=200,
         tips=[

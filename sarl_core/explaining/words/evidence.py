@@ -12,7 +12,7 @@ from sarl_core.explaining.colours import INTERVENTION_COLOUR, MUTED_COLOUR
 from sarl_core.mining.digits import limit_text
 from sarl_core.mining.evidence import HeldOut, Interval
 from sarl_core.mining.language import counted, number_text, share_text
-from sarl_core.mining.rules import Rule
+from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.validation.episode_counts import Influence
 from sarl_core.mining.validation.holding_out import (
     Shortfall,
@@ -279,6 +279,11 @@ def never_text(missing: Sequence[float]) -> str:
         were = "was" if unknown == 1 else "were"
         parts.append(f"{unknown:,} {were} met in too few held-out episodes to say")
     return f"No rule would reach it: {', and '.join(parts)}."
+
+
+def least_text(thresholds: Thresholds) -> str:
+    """What the confidence of a rule has to reach: of one that forbids, all but epsilon."""
+    return "the minimum confidence" if thresholds.never is None else "1 − epsilon"
 
 
 def verdict_counts(rules: Sequence[Rule], threshold: float) -> dict[Verdict, int]:

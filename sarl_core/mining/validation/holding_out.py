@@ -20,7 +20,7 @@ from sarl_core.errors import InputError
 from sarl_core.mining.evidence import FEWEST_EPISODES, EpisodeCounts, HeldOut, held_out_of, t_reach
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.rules import Rule
+from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.episode_counts import count_nodes, count_rules
 
@@ -162,6 +162,11 @@ def best_lower_bound(episodes: int) -> float:
         for any interval.
     """
     return held_out_of([1] * episodes, [1] * episodes).low or 0.0
+
+
+def least_confidence(thresholds: Thresholds) -> float:
+    """What the confidence of rules has to reach; of rules that forbid all but epsilon."""
+    return thresholds.confidence if thresholds.never is None else 1.0 - thresholds.never
 
 
 def verdict(rule: Rule, threshold: float) -> Verdict:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
-from sarl_core.mining.validation.cross_fitting import Judged, judge
+from sarl_core.mining.validation.cross_fitting import Judged, judge, judge_pairs
 from sarl_core.mining.validation.episode_counts import Influence, count_rules, most_influential
-from sarl_core.mining.validation.holding_out import more_episodes
+from sarl_core.mining.validation.holding_out import least_confidence, more_episodes
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.data import data_parts, mined_data
 from sarl_dashboard.state.hold_out import Parts
@@ -23,7 +23,7 @@ class Findings:
     Attributes:
         rules: The most support first.
         missing: Episodes that each still misses.
-        threshold: The minimum confidence.
+        threshold: What the confidence of each has to reach.
         judged: All of them together on the episodes held out; None where there are none.
         influences: The held-out episode that moves the share of each rule most.
     """
@@ -76,7 +76,7 @@ def chosen_evidence() -> RuleSetEvidence:
 def _findings(evidence: RuleSetEvidence) -> Findings:
     rule_set, held_out = evidence.rule_set, evidence.parts.held_out
     rules = tuple(sorted(rule_set, key=lambda rule: -rule.samples))
-    threshold = rule_set.thresholds.confidence
+    threshold = least_confidence(rule_set.thresholds)
     missing = more_episodes(rules, evidence.episodes, threshold)
     if not evidence.held_out:
         return Findings(rules, missing, threshold, None, (None,) * len(rules))
@@ -90,4 +90,9 @@ def _findings(evidence: RuleSetEvidence) -> Findings:
         most_influential(*counts.of(place), counts.numbers, counts.lengths)
         for place in range(len(rules))
     )
-    return Findings(rules, missing, threshold, judge(rule_set, counts), influences)
+    judged = (
+        judge_pairs(rule_set, held_out)
+        if rule_set.forbids and held_out is not None
+        else judge(rule_set, counts)
+    )
+    return Findings(rules, missing, threshold, judged, influences)

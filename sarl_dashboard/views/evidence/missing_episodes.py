@@ -9,7 +9,7 @@ import streamlit as st
 from sarl_core.explaining.html.evidence import enough_plot
 from sarl_core.explaining.html.headings import note
 from sarl_core.explaining.tables.evidence import enough_columns
-from sarl_core.explaining.words.evidence import never_text
+from sarl_core.explaining.words.evidence import least_text, never_text
 from sarl_dashboard.cache import cached
 from sarl_dashboard.components.tables import action_column, table_height
 from sarl_dashboard.views.evidence.evidence import RuleSetEvidence
@@ -47,12 +47,13 @@ def show_enough(evidence: RuleSetEvidence) -> None:
             icon=":material/info:",
         )
         return
+    least = least_text(evidence.thresholds)
     st.html(
         note(
-            "How many more episodes until the lower end of a rule's interval would reach the "
-            "minimum confidence, if the same share of them was held out, and the rule applied as "
-            "often and was right as often, and as unevenly, as so far. Where the confidence itself "
-            "does not lie above the minimum, no number is enough."
+            f"How many more episodes until the lower end of a rule's interval would reach {least}, "
+            "if the same share of them was held out, and the rule applied as often and was right "
+            "as often, and as unevenly, as so far. Where the confidence itself does not lie above "
+            "that, no number is enough."
         )
     )
     none = never_text(findings.missing)
@@ -62,9 +63,10 @@ def show_enough(evidence: RuleSetEvidence) -> None:
     else:
         left, table = st.columns([1, 2], gap="medium")
         with left, st.container(key="enough"):
-            st.html(enough_plot(findings.missing))
+            st.html(enough_plot(findings.missing, least))
     with table:
         column = st.column_config
+        forbidding = [rule for rule in findings.rules if rule.forbids]
         st.dataframe(
             _enough(evidence),
             hide_index=True,
@@ -72,7 +74,9 @@ def show_enough(evidence: RuleSetEvidence) -> None:
             key="enough_table",
             column_config={
                 "Rule": column.TextColumn(width=60),
-                "Action": action_column(evidence.rule_set.actions, "What the rule says")[0],
+                "Action": action_column(
+                    evidence.rule_set.actions, "What the rule says", forbidding
+                )[0],
                 "Still missing": column.TextColumn(width=155),
                 "Held out": column.TextColumn(
                     width=170,

@@ -1,4 +1,4 @@
-"""All rules on the page Evidence, and how many of them reach the minimum confidence."""
+"""All rules on the page Evidence, and how many of them reach the confidence they have to."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from sarl_core.explaining.words.cross_fit import influence_sentences, judged_sen
 from sarl_core.explaining.words.evidence import (
     VERDICT_COLOURS,
     VERDICTS,
+    least_text,
     remedy_text,
     verdict_counts,
 )
@@ -25,9 +26,9 @@ from sarl_dashboard.views.evidence.evidence import RuleSetEvidence
 
 MOST_DRAWN = 600
 MEANINGS: tuple[tuple[Verdict, str], ...] = (
-    ("reached", "The whole 95 % interval lies at or above the minimum confidence"),
-    ("open", "The minimum confidence lies within the interval: not enough is known"),
-    ("below", "The whole interval lies below the minimum confidence"),
+    ("reached", "The whole 95 % interval lies at or above {least}"),
+    ("open", "{least} lies within the 95 % interval: not enough is known"),
+    ("below", "The whole 95 % interval lies below {least}"),
     ("unknown", f"The rule applied in fewer than {FEWEST_EPISODES} of the held-out episodes"),
 )
 
@@ -39,9 +40,12 @@ def _overview(evidence: RuleSetEvidence) -> Markup:
 
 
 def show_overview(evidence: RuleSetEvidence) -> None:
-    """All rules with what is known of them, and how many reach the minimum confidence."""
+    """All rules with what is known of them, and how many reach what they have to."""
     findings = evidence.findings
     judged = findings.judged
+    forbids = evidence.thresholds.never is not None
+    least = least_text(evidence.thresholds)
+    did = "did nothing that is forbidden there" if forbids else "did what it says"
     numbers = [Number("Rules", f"{len(findings.rules):,}")]
     sentences = []
     if judged is not None:
@@ -51,19 +55,23 @@ def show_overview(evidence: RuleSetEvidence) -> None:
             Number(
                 "Held-out fidelity",
                 share_text(math.nan if share is None else share, decimals=1),
-                "Share of the states with a rule in which the expert did what it says, on average "
-                "over the held-out episodes",
+                f"Share of the states with a rule in which the expert {did}, on average over the "
+                "held-out episodes",
             )
         )
         numbers += [
-            Number(VERDICTS[name].capitalize(), f"{counts[name]:,}", meaning)
+            Number(
+                VERDICTS[name].capitalize(),
+                f"{counts[name]:,}",
+                _capitalised(meaning.format(least=least)),
+            )
             for name, meaning in MEANINGS
         ]
         sentences = [judged_sentence(judged), *influence_sentences(judged)]
         short = shortfall(findings.rules, findings.threshold, evidence.held_out)
         remedy = remedy_text(short, evidence.episodes)
         if remedy:
-            sentences.insert(0, f"No rule reaches the minimum confidence: {remedy}.")
+            sentences.insert(0, f"No rule reaches {least}: {remedy}.")
     verdicts_drawn: tuple[Verdict, ...] = ("reached", "open", "below") if judged is not None else ()
     if len(findings.rules) > MOST_DRAWN:
         sentences.append(
@@ -76,7 +84,12 @@ def show_overview(evidence: RuleSetEvidence) -> None:
                 numbers=number_cards(numbers),
                 plot=_overview(evidence),
                 verdicts=[(VERDICT_COLOURS[name], VERDICTS[name]) for name in verdicts_drawn],
+                least=least,
                 threshold=share_text(findings.threshold),
                 sentences=sentences,
             )
         )
+
+
+def _capitalised(text: str) -> str:
+    return text[:1].upper() + text[1:]
