@@ -346,23 +346,6 @@ def rules_from_json(text: str | bytes, *, name: str = "the rule file") -> RuleSe
     return RuleSet(**vars(read_rules(text, name)))
 
 
-def require_demands(rule_set: RuleSet, what: str) -> None:
-    """Refuse rules that forbid, where only what rules demand is understood.
-
-    Args:
-        rule_set: Any.
-        what: Understands no others, as "the report".
-
-    Raises:
-        InputError: If there are never-rules among them.
-    """
-    if rule_set.forbids:
-        raise InputError(
-            f"{what} understands rules that demand an action, and some of these forbid one; choose "
-            "rules that demand"
-        )
-
-
 def obeying_labels(rule_set: RuleContents) -> NDArray[np.bool_]:
     """Which labels each rule lets be.
 

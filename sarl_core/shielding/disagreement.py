@@ -13,9 +13,15 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.derived import Combination, Extension
 from sarl_core.demonstrations.words import columns_of_words
 from sarl_core.mining.editing.difference import Difference, comparable, rule_difference
+from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.mining.rules import Rule
 from sarl_core.shielding.decisions import Ground, deciding, ground_of, labels_at, regions
+from sarl_core.shielding.leeway import labels_left_of_each
+from sarl_core.shielding.shield import Shield
+
+Choices = tuple[tuple[int, ...], ...]
 
 SAMPLED_STATES = 10_000
 _MARGIN = 0.1  # of the thresholds' range, on either side
@@ -43,8 +49,11 @@ class Disagreement:
         first: A rule set.
         second: Another.
         rules: Index of the rule in force in each set, -1 for none, two of (B, m).
-        labels: What each set says, -1 where no rule applies, two of (B, m).
+        labels: What each set says, -1 where no rule applies, two of (B, m). Rules that forbid say
+            the label that alone is left, or where several are a number past the last label.
         difference: Rules added, removed and changed.
+        choices: Of each action dimension the labels that are left where several are, in the order
+            of these numbers.
     """
 
     first: RuleSet
@@ -52,6 +61,7 @@ class Disagreement:
     rules: tuple[NDArray[np.int64], NDArray[np.int64]]
     labels: tuple[NDArray[np.int64], NDArray[np.int64]]
     difference: Difference
+    choices: tuple[Choices, ...]
 
     @property
     def states(self) -> int:
@@ -60,7 +70,10 @@ class Disagreement:
 
     @cached_property
     def differs(self) -> NDArray[np.bool_]:
-        """Where they decide differently, a rule and no rule included, (B, m)."""
+        """Where they decide differently, a rule and no rule included, (B, m).
+
+        Alike are two that leave the same labels, whether by what they demand or what they forbid.
+        """
         return np.asarray(self.labels[0] != self.labels[1])
 
     @cached_property
@@ -102,10 +115,10 @@ class Disagreement:
             dimension: Action dimension.
 
         Returns:
-            Shape (labels + 1, labels + 1), the first set's label by the second's; the last row
-            and column are for no rule.
+            Shape (labels + choices + 1, the same), what the first set says by what the second does;
+            the last row and column are for no rule.
         """
-        size = self.first.actions[dimension].n_labels + 1
+        size = self.first.actions[dimension].n_labels + len(self.choices[dimension]) + 1
         ours, theirs = (labels[:, dimension] % size for labels in self.labels)
         counts = np.bincount(ours * size + theirs, minlength=size * size)
         return counts.reshape(size, size).astype(np.int64)
@@ -138,8 +151,8 @@ def disagreement(
     if len(grounds[0].states) != len(grounds[1].states):
         raise ValueError("the two rule sets were walked with different states")
     rule_sets = [ground.rule_set for ground in grounds]
-    rules = [deciding(ground).first for ground in grounds]
-    labels = [labels_at(ruled, in_force) for ruled, in_force in zip(rule_sets, rules, strict=True)]
+    rules = [_in_force(ground) for ground in grounds]
+    labels, choices = _said(grounds, rules)
     return Disagreement(
         rule_sets[0],
         rule_sets[1],
@@ -151,7 +164,60 @@ def disagreement(
             (regions(grounds[0]), regions(grounds[1])),
             states=len(grounds[0].states),
         ),
+        choices,
     )
+
+
+def _in_force(ground: Ground) -> NDArray[np.int64]:
+    """The rule that decides each state; of several that forbid the first, (B, m)."""
+    if not ground.rule_set.forbids:
+        return deciding(ground).first
+    return Shield(ground.rule_set, on_invalid="pass").rules_in_force(_observed(ground))
+
+
+def _observed(ground: Ground) -> NDArray[np.float32]:
+    width = Extension.of(ground.rule_set.source.features).width
+    return np.ascontiguousarray(ground.states[:, :width])
+
+
+def _said(
+    grounds: Sequence[Ground], rules: Sequence[NDArray[np.int64]]
+) -> tuple[list[NDArray[np.int64]], tuple[Choices, ...]]:
+    """What each set says of the states, and the choices that rules which forbid leave."""
+    labels = [
+        labels_at(ground.rule_set, in_force)
+        for ground, in_force in zip(grounds, rules, strict=True)
+    ]
+    left = {
+        place: labels_left_of_each(Shield(ground.rule_set, on_invalid="pass"), _observed(ground))
+        for place, ground in enumerate(grounds)
+        if ground.rule_set.forbids
+    }
+    choices: list[Choices] = []
+    for dimension, action in enumerate(grounds[0].rule_set.actions):
+        there = {
+            place: np.unique(each[dimension], axis=0, return_inverse=True)
+            for place, each in left.items()
+        }
+        known: set[tuple[int, ...]] = set()
+        for kinds, _ in there.values():
+            known.update(tuple(np.flatnonzero(kind).tolist()) for kind in kinds)
+        several = [one for one in known if 1 < len(one) < action.n_labels]
+        choices.append(tuple(sorted(several, key=lambda one: (-len(one), one[::-1]))))
+        for place, (kinds, of_each) in there.items():
+            codes = [_code(np.flatnonzero(kind).tolist(), action, choices[-1]) for kind in kinds]
+            said = np.array(codes, dtype=np.int64)[of_each.reshape(-1)]
+            labels[place][:, dimension] = np.where(rules[place][:, dimension] < 0, NO_RULE, said)
+    return labels, tuple(choices)
+
+
+def _code(left: list[int], action: LabelledDimension, choices: Choices) -> int:
+    """A number for labels that are left: the only one, or a place behind the last label."""
+    if len(left) == 1:
+        return left[0]
+    if len(left) == action.n_labels:
+        return NO_RULE
+    return action.n_labels + choices.index(tuple(left))
 
 
 def _rules_of(each: RuleSet | Ground) -> RuleSet:

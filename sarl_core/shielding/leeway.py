@@ -111,11 +111,52 @@ def labels_left(shield: Shield, state: NDArray[np.float32], dimension: int) -> L
     )
 
 
+def labels_left_of_each(shield: Shield, states: NDArray[np.float32]) -> list[NDArray[np.bool_]]:
+    """What may be done in each of many states, whatever rules decide there.
+
+    Args:
+        shield: With m action dimensions.
+        states: Shape (B, d).
+
+    Returns:
+        Of each dimension with L labels which of them are executed as they are, (B, L); at least one
+        in each state.
+    """
+    actions = shield.rule_set.actions
+    wanted = [_proposable(one) for one in actions]
+    left = [np.zeros((len(states), len(values)), dtype=np.bool_) for values in wanted]
+    for turn in range(max(map(len, wanted))):  # asked of the shield itself, as above
+        labels = [min(turn, len(values) - 1) for values in wanted]
+        proposed = np.array([[values[at] for values, at in zip(wanted, labels, strict=True)]])
+        proposed = np.repeat(proposed, len(states), axis=0)
+        decided = shield.decide_batch(states, proposed if len(wanted) > 1 else proposed[:, 0])
+        executed = np.reshape(decided.executed, proposed.shape)
+        for place, (action, label) in enumerate(zip(actions, labels, strict=True)):
+            left[place][:, label] = action.labels_of(executed[:, place]) == label
+    return left
+
+
 def _proposable(dimension: LabelledDimension) -> Sequence[float]:
     """An action of each label."""
     if not dimension.is_interval:
         return dimension.actions
     return [(low + high) / 2 for low, high in pairwise(dimension.edges)]
+
+
+def leeway_in(rule_set: RuleSet, states: NDArray[np.float32]) -> Leeway:
+    """What rules leave in states of which nobody knows what an expert would do.
+
+    Args:
+        rule_set: Any.
+        states: Shape (B, d).
+
+    Returns:
+        With a fidelity of NaN.
+    """
+    shield = Shield(rule_set, on_invalid="pass")
+    rules = shield.rules_in_force(states)
+    freedom = float(shield.freedom(states, rules).mean())
+    return Leeway(coverage=float((rules >= 0).mean()), fidelity=float("nan"), freedom=freedom)
 
 
 def leeway_of(rule_set: RuleSet, demonstrations: Demonstrations) -> Leeway:

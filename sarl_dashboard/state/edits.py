@@ -15,6 +15,7 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.derived import Extension
 from sarl_core.errors import InputError
 from sarl_core.mining.applications import labels_of
 from sarl_core.mining.editing.edits import Edit, History, Regrow, apply
@@ -24,6 +25,7 @@ from sarl_core.mining.validation.holding_out import with_untried_held_out
 from sarl_core.shielding.decisions import Ground, ground_of
 from sarl_core.shielding.disagreement import sampled_states
 from sarl_core.shielding.effects import Verdicts, verdicts
+from sarl_core.shielding.leeway import Leeway, leeway_in, leeway_of
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.data import (
     chosen_demonstrations,
@@ -173,9 +175,17 @@ def _basis(rule_set: RuleSet, demonstrations: Demonstrations | None) -> Basis:
     return Basis(ground, labels_of(rule_set, demonstrations), noun)
 
 
-def verdicts_of_set(rule_set: RuleSet) -> Verdicts:
-    """What rules say of the states on which they are counted."""
-    return _verdicts(rule_set, (), None, demonstrations_for(rule_set))
+def leeway_of_set(rule_set: RuleSet) -> Leeway:
+    """What rules, of either kind, say of the states on which they are counted."""
+    return _leeway(rule_set, demonstrations_for(rule_set))
+
+
+@cached()
+def _leeway(rule_set: RuleSet, demonstrations: Demonstrations | None) -> Leeway:
+    if demonstrations is None:
+        width = Extension.of(rule_set.source.features).width
+        return leeway_in(rule_set, sampled_states([rule_set])[:, :width])
+    return leeway_of(rule_set, demonstrations)
 
 
 def verdicts_of(of: Base, edits: tuple[Edit, ...]) -> Verdicts:

@@ -6,6 +6,7 @@ import re
 import time
 from dataclasses import replace
 from functools import partial
+from html import unescape
 
 import pytest
 
@@ -147,3 +148,17 @@ def test_all_rules_that_forbid_are_judged_in_episodes_that_they_were_not_mined_f
     assert metrics(app)["Fidelity"] == share_text(fidelity, decimals=1)
     deltas = {metric.label: metric.delta for metric in app.metric if metric.delta}
     assert deltas["Fidelity"].startswith("elsewhere ")
+
+
+def test_compare_counts_them_as_thresholds_does(rules: RuleSet) -> None:
+    """92.4 % here and there, by states."""
+    app = open_page("difference", sets="in force|unfiltered", **FORBID)
+    leeway = leeway_of(rules, LANDER)
+    (line,) = re.findall(r"<tr><td[^>]*>in force</td>(.*?)</tr>", html(app))
+    cells = [unescape(cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", line)]
+    assert cells[2:] == [
+        share_text(one) for one in (leeway.coverage, leeway.fidelity, leeway.freedom)
+    ]
+    assert metrics(open_page("thresholds", **FORBID))["Fidelity"] == share_text(
+        leeway.fidelity, decimals=1
+    )

@@ -79,11 +79,13 @@ def test_a_replay_says_at_each_step_what_is_left(mined: RuleSet) -> None:
     assert 0 < int(metrics(app)["Freedom"].split()[0]) < 100
 
 
-def test_comparing_understands_demands_alone(mined: RuleSet) -> None:
-    (error,) = errors(opened("difference", mined))
-    assert error.startswith("The comparison of two rule sets understands rules that demand")
-    assert "on the page Thresholds" in error
-    assert "--never" not in error
+def test_comparing_them_with_rules_that_demand(mined: RuleSet) -> None:
+    app = opened("difference", mined)
+    assert not errors(app)
+    assert "as on Thresholds" in texts(app)
+    assert "never do nothing" in html(app)
+    examples = next(one.value for one in app.dataframe if "Expert did" in one.value)
+    assert examples.iloc[:, 2].str.startswith("never ").any()
 
 
 def test_the_report_is_offered_for_rules_that_forbid(mined: RuleSet) -> None:

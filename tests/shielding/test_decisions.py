@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sarl_core import Demonstrations, InputError, RuleSet, Shield, mine_rules
+from sarl_core import (
+    Demonstrations,
+    InputError,
+    RuleSet,
+    Shield,
+    grow_policy_trees,
+    mine_rules,
+)
 from sarl_core.mining.applications import labels_of
 from sarl_core.mining.editing.edits import Add, Move, Pin, Switch, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
+from sarl_core.mining.never.never_rules import mine_never_rules
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.shielding.decisions import deciding, ground_of, labels_at, regions
 from sarl_core.shielding.disagreement import disagreement, sampled_states
@@ -251,3 +261,58 @@ def test_a_feature_with_one_threshold_or_none_is_sampled_too():
     states = sampled_states([lone], count=200)
     assert (states[:, [0, 2]] == 0).all()
     assert 0 < (states[:, 1] > 4).mean() < 1
+
+
+def test_rules_that_forbid_say_what_they_leave(lander_like: Demonstrations) -> None:
+    trees = grow_policy_trees(lander_like)
+    never = mine_never_rules(trees, epsilon=0.2, supp_min=0.05)
+    demanding = mine_rules(trees, supp_min=0.05, conf_min=0.8)
+    states = lander_like.observations
+    found = disagreement(demanding, never, states)
+    shield, count = Shield(never), never.actions[0].n_labels
+    left = np.stack(
+        [
+            ~shield.decide_batch(states, np.full(len(states), label)).intervened
+            for label in range(count)
+        ],
+        axis=1,
+    )
+    said = found.labels[1][:, 0]
+    for row, code in enumerate(said.tolist()):
+        there = tuple(np.flatnonzero(left[row]).tolist())
+        if code < 0:
+            assert len(there) == count
+        elif code < count:
+            assert there == (code,)
+        else:
+            assert there == found.choices[0][code - count]
+    assert found.choices[0]
+    assert found.confusion(0).sum() == len(states)
+    np.testing.assert_array_equal(found.differs[:, 0], found.labels[0][:, 0] != said)
+    same = disagreement(never, never, states)
+    assert same.different == 0
+    assert same.difference.same == len(never)
+    # Two that forbid different things in the same states are two rules, and not one that changed.
+    fewer = replace(never, rules=never.rules[1:])
+    assert [rule.id for rule in disagreement(never, fewer, states).difference.removed] == [
+        never.rules[0].id
+    ]
+    assert not disagreement(never, fewer, states).difference.changed
+
+
+def test_to_forbid_all_but_one_label_is_to_demand_it(lander_like: Demonstrations) -> None:
+    demanding = mine_rules(lander_like, supp_min=0.05, conf_min=0.8)
+    others = [
+        [label for label in range(demanding.actions[0].n_labels) if label != rule.action]
+        for rule in demanding
+    ]
+    forbidding = replace(
+        demanding,
+        rules=tuple(
+            replace(rule, forbids=tuple(some), instead=(rule.action,), demonstrated_value=None)
+            for rule, some in zip(demanding.rules, others, strict=True)
+        ),
+    )
+    found = disagreement(demanding, forbidding, lander_like.observations)
+    assert found.different == 0
+    assert found.difference.same == 0

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.demonstrations.derived import extend
 from sarl_core.explaining.words.difference import said_text, what_text
 from sarl_core.explaining.words.states import state_columns
 from sarl_core.mining.action_words import label_text, says_text
@@ -101,11 +102,12 @@ def example_rows(
         strict=True,
     ):
         action = rule_set.actions[dimension]
-        says = [said_text(label, action) for label in labels[rows, dimension].tolist()]
+        choices = disagreement.choices[dimension]
+        says = [said_text(label, action, choices) for label in labels[rows, dimension].tolist()]
         columns[f"{_capital(name)} says"] = says
         columns[f"Rule, {name}"] = [
-            NO_ID if index == NO_RULE else rule_set.name_of(rule_set.rules[index])
-            for index in rules[rows, dimension].tolist()
+            ", ".join(map(rule_set.name_of, _deciding(rule_set, index, state))) or NO_ID
+            for index, state in zip(rules[rows, dimension].tolist(), states[rows], strict=True)
         ]
     if demonstrations is not None:
         action = disagreement.first.actions[dimension]
@@ -120,6 +122,24 @@ def example_rows(
             else states[rows, column.places[0]].tolist()
         )
     return columns
+
+
+def _deciding(rule_set: RuleSet, index: int, state: NDArray[np.float32]) -> list[Rule]:
+    """The rule that decides a state; of rules that forbid, all that apply."""
+    if index == NO_RULE:
+        return []
+    first = rule_set.rules[index]
+    if not first.forbids:
+        return [first]
+    extended = extend(state[None], rule_set.source.features)
+    return [
+        rule
+        for rule in rule_set.rules
+        if rule.forbids
+        and rule.enabled
+        and rule.dimension == first.dimension
+        and rule.applies(extended)[0]
+    ]
 
 
 def _capital(text: str) -> str:

@@ -16,23 +16,31 @@ from sarl_core.mining.language import (
 )
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
-from sarl_core.shielding.disagreement import Disagreement
+from sarl_core.shielding.disagreement import Choices, Disagreement
 
 NO_RULE_TEXT = "no rule"
 _MOST_IN_TEXT = 10  # rules of each kind in the text for a terminal
 
 
-def said_text(label: int, dimension: LabelledDimension) -> str:
+def said_text(label: int, dimension: LabelledDimension, choices: Choices = ()) -> str:
     """What a rule set says of a state.
 
     Args:
-        label: A label, or one that no label is (-1, or one past the last) for no rule.
+        label: A label, a choice behind the last label, or none of these (-1, or one past the last)
+            for no rule.
         dimension: Whose label it is.
+        choices: Labels that rules which forbid leave, where several are.
 
     Returns:
-        As "push right" or "no rule".
+        As "push right", "never push right or push left" or "no rule".
     """
-    return label_text(label, dimension) if 0 <= label < dimension.n_labels else NO_RULE_TEXT
+    if 0 <= label < dimension.n_labels:
+        return label_text(label, dimension)
+    if not 0 <= label - dimension.n_labels < len(choices):
+        return NO_RULE_TEXT
+    left = choices[label - dimension.n_labels]
+    forbidden = [one for one in range(dimension.n_labels) if one not in left]
+    return f"never {' or '.join(label_text(one, dimension) for one in forbidden)}"
 
 
 def what_text(change: RuleChange, difference: Disagreement, *, beside: bool = False) -> str:
@@ -192,7 +200,13 @@ def difference_document(
                 "name": action.name,
                 "different": int(disagreement.differs[:, at].sum()),
                 **disagreement.kinds(at)._asdict(),
-                "says": [*(label_text(one, action) for one in range(action.n_labels)), None],
+                "says": [
+                    *(
+                        said_text(one, action, disagreement.choices[at])
+                        for one in range(action.n_labels + len(disagreement.choices[at]))
+                    ),
+                    None,
+                ],
                 "confusion": disagreement.confusion(at).tolist(),
             }
             for at, action in enumerate(disagreement.first.actions)
@@ -206,6 +220,7 @@ def _rule(rule: Rule, rule_set: RuleSet) -> dict[str, Any]:
         "dimension": rule.dimension,
         "conditions": [condition._asdict() for condition in rule.conditions],
         "action": rule.action,
+        **({"forbids": list(rule.forbids)} if rule.forbids else {}),
         "enabled": rule.enabled,
         "pinned": rule.pinned,
         "origin": rule.origin,

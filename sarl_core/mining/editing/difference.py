@@ -23,7 +23,7 @@ from sarl_core.errors import InputError
 from sarl_core.mining.editing.manual_rules import region_of
 from sarl_core.mining.editing.shared_words import in_shared_words
 from sarl_core.mining.rule_order import Fitted, fitted_rules
-from sarl_core.mining.rule_set import RuleSet, require_demands
+from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 
 What = Literal["conditions", "action", "switched", "place", "origin"]
@@ -80,8 +80,6 @@ def comparable(first: RuleSet, second: RuleSet) -> Fitted:
     Raises:
         InputError: If their features, actions or intervals differ.
     """
-    for each in (first, second):
-        require_demands(each, "the comparison of two rule sets")
     known = first.source.env_id != "" and first.source.env_id == second.source.env_id
     observed = [observed_features(each.source.features) for each in (first, second)]
     if len(observed[0]) != len(observed[1]):
@@ -231,7 +229,7 @@ class _Pairing:
             if share[at] <= _HALF:
                 break
             here, there = int(common.row[at]), int(common.col[at])
-            alike = self._rules[0][here].dimension == self._rules[1][there].dimension
+            alike = _kind(self._rules[0][here]) == _kind(self._rules[1][there])
             if alike and here in self.free[0] and there in self.free[1]:
                 self._pair(here, there)
 
@@ -244,7 +242,7 @@ class _Pairing:
             for index in sorted(free - reached):
                 rule = rules[index]
                 path = tuple((condition.feature, condition.op) for condition in rule.conditions)
-                known[rule.dimension, path].append(index)
+                known[_kind(rule), path].append(index)
             waiting.append(known)
         for kind, ours in waiting[0].items():
             theirs = waiting[1].get(kind, [])
@@ -253,7 +251,13 @@ class _Pairing:
 
 
 def _region_key(rule: Rule, with_action: bool) -> object:
-    return rule.dimension, region_of(rule), rule.action if with_action else None
+    says = rule.action if with_action and not rule.forbids else None
+    return _kind(rule), region_of(rule), says
+
+
+def _kind(rule: Rule) -> object:
+    """Rules of other kinds are never the same one: to forbid, one has to forbid the same."""
+    return rule.dimension, tuple(sorted(rule.forbids))
 
 
 def _moved(first: RuleSet, second: RuleSet, pairs: list[tuple[int, int]]) -> set[tuple[int, int]]:
@@ -275,7 +279,7 @@ def _moved(first: RuleSet, second: RuleSet, pairs: list[tuple[int, int]]) -> set
 def _what(before: Rule, after: Rule, *, moved: bool) -> tuple[What, ...]:
     differs: dict[What, bool] = {
         "conditions": region_of(before) != region_of(after),
-        "action": before.action != after.action,
+        "action": before.action != after.action and not before.forbids,
         "switched": before.enabled != after.enabled,
         "place": moved or before.pinned != after.pinned,
         "origin": before.origin != after.origin,

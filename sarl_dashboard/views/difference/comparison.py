@@ -10,7 +10,7 @@ import streamlit as st
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.errors import InputError, SarlError
+from sarl_core.errors import SarlError
 from sarl_core.explaining.html.confusion import confusion_html
 from sarl_core.explaining.tables.difference import KINDS, example_rows, rule_rows
 from sarl_core.explaining.words.difference import decided_text, rows_text
@@ -77,12 +77,6 @@ def comparison() -> None:
         st.info("Choose at least two rule sets to compare.", icon=":material/compare_arrows:")
         return
     try:
-        if any(side.rule_set.forbids for side in sides):
-            raise InputError(
-                "the comparison of two rule sets understands rules that demand an action, and some "
-                "of these forbid one; choose rules that demand, on the page Thresholds, or other "
-                "rules above"
-            )
         show_overview(sides, _different)
         compared = _compare(*_pair(sides))
         if compared.demonstrations is not None:
@@ -204,8 +198,11 @@ def _show_rules(compared: RuleSetComparison) -> None:
     kinds = KINDS if view == EVERY else (view,)
     frame = _rules_frame(compared, kinds)
     column = st.column_config
-    action, action_width = action_column(disagreements.first.actions, "What the rule says")
-    high = row_height(disagreements.first, disagreements.second)
+    forbidding = [rule for side in _both(disagreements) for rule in side.rules if rule.forbids]
+    action, action_width = action_column(
+        disagreements.first.actions, "What the rule says", forbidding
+    )
+    high = row_height(*_both(disagreements))
     st.dataframe(
         frame,
         hide_index=True,
@@ -226,6 +223,10 @@ def _show_rules(compared: RuleSetComparison) -> None:
             ),
         },
     )
+
+
+def _both(disagreements: Disagreement) -> tuple[RuleSet, RuleSet]:
+    return disagreements.first, disagreements.second
 
 
 def _show_states(compared: RuleSetComparison) -> None:

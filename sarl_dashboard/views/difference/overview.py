@@ -22,6 +22,8 @@ def show_overview(sides: Sequence[Side], different: Callable[[Side, Side], float
     lines = [_line(side) for side in sides]
     with st.container(width=_WIDTH):
         st.html(table_html(_COLUMNS, lines, "What each rule set comes to"))
+    if any(side.rule_set.forbids for side in sides):
+        st.caption(_BOTH_KINDS)
     if len(sides) > 2:
         st.caption("Share of the states that two of them decide differently:")
         columns = (Column("Rule set"), *(Column(side.name, "n") for side in sides[:-1]))
@@ -35,25 +37,33 @@ def show_overview(sides: Sequence[Side], different: Callable[[Side, Side], float
             )
 
 
-_WIDTH = 560  # pixels, where there are so many
+_WIDTH = 640  # pixels, where there are so many
 _COLUMNS = (
     Column("Rule set"),
     Column("Rules", "n", "That are switched on"),
     Column("Mean length", "n", "Of the rules that are switched on"),
     Column("Coverage", "n"),
     Column("Fidelity", "n"),
+    Column("Freedom", "n"),
+)
+_BOTH_KINDS = (
+    "Fidelity is counted by states, as on Thresholds: of those with a rule, the share in which the "
+    "expert did what a rule demands there, or nothing of what rules forbid there. Freedom is what "
+    "is left to choose from in the mean of all states. Two sets decide a state alike where both "
+    "leave the same actions, whether they demand or forbid."
 )
 
 
 def _line(side: Side) -> tuple[str, ...]:
-    verdicts = edits.verdicts_of_set(side.rule_set)
+    leeway = edits.leeway_of_set(side.rule_set)
     lengths = [rule.length for rule in side.rule_set.rules if rule.enabled]
     return (
         side.name,
         f"{len(lengths):,}",
         f"{sum(lengths) / max(len(lengths), 1):.1f}",
-        share_text(verdicts.coverage),
-        share_text(verdicts.fidelity),
+        share_text(leeway.coverage),
+        share_text(leeway.fidelity),
+        share_text(leeway.freedom),
     )
 
 
