@@ -5,8 +5,7 @@ from __future__ import annotations
 import streamlit as st
 
 from sarl_core.mining.language import counted
-from sarl_dashboard.components.settings import forbidding_notice, other_data_notice
-from sarl_dashboard.session import end_page
+from sarl_dashboard.components.settings import other_data_notice
 from sarl_dashboard.state import edits
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.edit.base import edited_base
@@ -18,8 +17,6 @@ st.caption(
     "another condition: edits stay while the thresholds move, and are in force on every page."
 )
 base = edited_base()
-if forbidding_notice("Editing"):
-    end_page()
 other_data_notice()
 if base.name:
     st.caption(f"The rules of {escaped(base.name)}, {len(base.rule_set):,} of them.")

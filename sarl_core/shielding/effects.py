@@ -8,8 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.demonstrations.derived import Extension
+from sarl_core.mining.applications import applications
+from sarl_core.mining.rule_set import RuleSet, obeying_labels
+from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.shielding.decisions import Ground, deciding, labels_at
+from sarl_core.shielding.leeway import labels_left_of_each, left_codes
+from sarl_core.shielding.shield import Shield
 
 
 class Conflict(NamedTuple):
@@ -38,10 +43,17 @@ class Verdicts:
 
     Attributes:
         rule_set: With n rules.
-        labels: What it says, -1 where no rule applies, (B, m).
-        decided: Number of states that each rule decides, (n,).
+        labels: What it says, -1 where no rule applies, (B, m). Rules that forbid say the label
+            that alone is left, or where several are a number past the last label, the same for the
+            same ones.
+        decided: Number of states that each rule decides, (n,); of one that forbids, in which it
+            has a say.
         right: On how many of them the expert did as it says, (n,); None without an expert.
-        conflicts: Placed rules that overrule others, the most states first.
+        conflicts: Placed rules that overrule others, the most states first; none among rules that
+            forbid, which add up.
+        covered: Number of states with a rule, over the action dimensions.
+        obeyed: In how many of them the expert did as all say that apply; None without an expert.
+        freedom: What is left to choose from, in the mean of the states.
     """
 
     rule_set: RuleSet
@@ -49,6 +61,9 @@ class Verdicts:
     decided: NDArray[np.int64]
     right: NDArray[np.int64] | None
     conflicts: tuple[Conflict, ...]
+    covered: int
+    obeyed: int | None
+    freedom: float
 
     @property
     def coverage(self) -> float:
@@ -58,10 +73,9 @@ class Verdicts:
     @property
     def fidelity(self) -> float:
         """Share of the covered states in which the expert did as the rules say; NaN if unknown."""
-        covered = int(self.decided.sum())
-        if self.right is None or not covered:
+        if self.obeyed is None or not self.covered:
             return float("nan")
-        return int(self.right.sum()) / covered
+        return self.obeyed / self.covered
 
 
 def verdicts(
@@ -77,18 +91,61 @@ def verdicts(
     Returns:
         Labels, counts and conflicts.
     """
+    if rule_set.forbids:
+        return _of_forbidding(ground, rule_set, expert)
     first, second = deciding(ground, rule_set)
     labels, behind = labels_at(rule_set, first), labels_at(rule_set, second)
     n = len(rule_set.rules)
     right = None
     if expert is not None:
         right = _counts(first[(first >= 0) & (labels == expert)], n)
+    covered = int((first >= 0).sum())
     return Verdicts(
         rule_set,
         labels,
         _counts(first[first >= 0], n),
         right,
         _conflicts(rule_set, first, second, labels, behind, expert),
+        covered=covered,
+        obeyed=None if right is None else int(right.sum()),
+        freedom=1.0 - covered / first.size if first.size else float("nan"),
+    )
+
+
+def _of_forbidding(ground: Ground, rule_set: RuleSet, expert: NDArray[np.int64] | None) -> Verdicts:
+    """The same where some rules forbid: any number of those has a say in a state."""
+    shield = Shield(rule_set, on_invalid="pass")
+    width = Extension.of(rule_set.source.features).width
+    states = np.ascontiguousarray(ground.states[:, :width])
+    first = shield.rules_in_force(states)
+    left = labels_left_of_each(shield, states)
+    labels = np.stack([left_codes(each) for each in left], axis=1)
+    labels[first < 0] = NO_RULE
+    demands = np.array([not rule.forbids for rule in rule_set.rules] + [False])[first]
+    enabled = np.array([rule.enabled for rule in rule_set.rules])
+    forbids = np.array([bool(rule.forbids) for rule in rule_set.rules])
+    dimension = np.array([rule.dimension for rule in rule_set.rules], dtype=np.int64)
+    applied = applications(rule_set, ground.states)
+    rule, row = applied.rule, applied.row
+    says = enabled[rule] & forbids[rule] & ~demands[row, dimension[rule]]
+    rows, columns = np.nonzero(demands)
+    rule, row = np.append(rule[says], first[rows, columns]), np.append(row[says], rows)
+    n, right, obeyed = len(rule_set.rules), None, None
+    if expert is not None:
+        as_it_says = obeying_labels(rule_set)[rule, expert[row, dimension[rule]]]
+        right = _counts(rule[as_it_says], n)
+        broken = np.zeros(first.shape, dtype=np.bool_)
+        broken[row[~as_it_says], dimension[rule[~as_it_says]]] = True
+        obeyed = int(((first >= 0) & ~broken).sum())
+    return Verdicts(
+        rule_set,
+        labels,
+        _counts(rule, n),
+        right,
+        (),
+        covered=int((first >= 0).sum()),
+        obeyed=obeyed,
+        freedom=float(shield.freedom(states, first).mean()) if len(states) else float("nan"),
     )
 
 

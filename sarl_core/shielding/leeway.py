@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import blake2b
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.applications import labels_of
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet, obeying_labels
+from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.shielding.shield import Shield
 
 
@@ -134,6 +136,29 @@ def labels_left_of_each(shield: Shield, states: NDArray[np.float32]) -> list[NDA
         for place, (action, label) in enumerate(zip(actions, labels, strict=True)):
             left[place][:, label] = action.labels_of(executed[:, place]) == label
     return left
+
+
+def left_codes(left: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Numbers for the labels that are left, the same for the same ones.
+
+    Args:
+        left: Which are, (B, L).
+
+    Returns:
+        The label where one is left, a number past the last label where several are, and -1 where
+        all are, (B,).
+    """
+    count = left.shape[1]
+    kinds, of_each = np.unique(left, axis=0, return_inverse=True)
+    codes = [
+        int(kind.argmax())
+        if kind.sum() == 1
+        else NO_RULE
+        if kind.all()
+        else count + int.from_bytes(blake2b(kind.tobytes(), digest_size=6).digest())
+        for kind in kinds
+    ]
+    return np.array(codes, dtype=np.int64)[of_each.reshape(-1)]
 
 
 def _proposable(dimension: LabelledDimension) -> Sequence[float]:

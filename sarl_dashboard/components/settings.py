@@ -253,25 +253,6 @@ def other_data_notice() -> bool:
     return True
 
 
-def forbidding_notice(what: str) -> bool:
-    """Say that something understands no rules that forbid, where some in force do.
-
-    Args:
-        what: With a capital, as "Editing".
-
-    Returns:
-        Whether some do.
-    """
-    if not in_force.rules().forbids:
-        return False
-    st.info(
-        f"{what} understands rules that demand an action, and some of those in force forbid one; "
-        "choose others in the sidebar, or rules that demand on the page Thresholds.",
-        icon=":material/block:",
-    )
-    return True
-
-
 def known_seeds_notice() -> None:
     """Say that rules are tried on seeds that they were mined from."""
     st.warning(

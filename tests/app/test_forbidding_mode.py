@@ -14,6 +14,8 @@ from sarl_core import RuleSet, grow_policy_trees, load_demonstrations
 from sarl_core.explaining.report.provenance import mined_again, mining_command
 from sarl_core.explaining.words.cross_fit import judged_sentence
 from sarl_core.explaining.words.evidence import VERDICTS, held_out_text, verdict_counts
+from sarl_core.mining.editing.edits import Add, Switch, apply
+from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.language import share_text
 from sarl_core.mining.never.never_rules import mine_never_rules
 from sarl_core.mining.validation.cross_fitting import cross_fit, judge_pairs
@@ -95,7 +97,6 @@ def test_the_rules_flow_to_the_other_pages(rules: RuleSet) -> None:
     trees = grow_policy_trees(LANDER)
     assert mined_again(rules, trees)
     assert not mined_again(replace(rules, rules=rules[1:]), trees)
-    assert "Editing understands rules that demand" in texts(open_page("edit", **FORBID))
     for page in ("what_if", "episodes", "overview", "names", "export"):
         assert not errors(open_page(page, **FORBID))
 
@@ -162,3 +163,40 @@ def test_compare_counts_them_as_thresholds_does(rules: RuleSet) -> None:
     assert metrics(open_page("thresholds", **FORBID))["Fidelity"] == share_text(
         leeway.fidelity, decimals=1
     )
+
+
+def test_rules_that_forbid_are_edited_and_in_force_on_every_page(rules: RuleSet) -> None:
+    app = open_page("edit", **FORBID)
+    leeway = leeway_of(rules, LANDER)
+    for name in ("coverage", "fidelity", "freedom"):
+        assert metrics(app)[name.title()] == share_text(getattr(leeway, name), decimals=1)
+    (largest,) = sorted(rules, key=lambda rule: -rule.samples)[:1]
+    # Another bound: a copy of the rule is changed, and the rule itself is switched off.
+    app.button(key="copy_rule").click().run()
+    (bound,) = [one for one in app.number_input if one.key.endswith("_at_0")]
+    assert bound.value == largest.conditions[0].threshold
+    bound.set_value(-0.3).run()
+    (save,) = [one for one in app.button if one.key.endswith("_save")]
+    assert "It would have a say in" in texts(app)
+    save.click().run()
+    app.query_params["rule"] = largest.id
+    app.run()
+    app.button(key="edit_switch").click().run()
+    asks = [Ask("vertical velocity", "<=", -0.3)]
+    by_hand = manual_rule(
+        rules,
+        asks,
+        rule_id="manual.1",
+        action=None,
+        forbids=largest.forbids,
+        demonstrations=LANDER,
+    )
+    expected = leeway_of(apply(rules, [Add(by_hand), Switch(largest.id, on=False)]), LANDER)
+    for name in ("coverage", "fidelity", "freedom"):
+        assert metrics(app)[name.title()] == share_text(getattr(expected, name), decimals=1)
+    assert "2 edits" in texts(app)
+    for page in ("rules", "what_if", "difference", "export", "report", "shield"):
+        app.switch_page(page_file(page)).run()
+        assert not app.exception
+        assert not errors(app), page
+        assert "edits" in app.query_params

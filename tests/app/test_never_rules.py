@@ -101,10 +101,14 @@ def test_what_each_rule_is_worth_is_found_out(mined: RuleSet) -> None:
     assert all(action.startswith("never ") for (action,) in table["Action"])
 
 
-def test_editing_understands_demands_alone(mined: RuleSet) -> None:
+def test_a_rule_of_a_file_is_switched_off(mined: RuleSet) -> None:
     app = opened("edit", mined)
-    assert "Editing understands rules that demand an action" in texts(app)
-    assert not app.dataframe
+    assert not errors(app)
+    assert "Rules that forbid add up" in texts(app)
+    before = metrics(app)["Freedom"]
+    app.button(key="edit_switch").click().run()
+    assert metrics(app)["Rules in force"] == str(len(mined) - 1)
+    assert metrics(app)["Freedom"] != before
 
 
 @pytest.mark.parametrize("page", ["episodes", "audit", "shield", "export", "library", "evidence"])

@@ -18,6 +18,7 @@ from sarl_core import (
     mine_rules,
 )
 from sarl_core.mining.applications import labels_of
+from sarl_core.mining.editing.edit_files import edits_from_json, edits_to_json
 from sarl_core.mining.editing.edits import Add, Move, Pin, Switch, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.never.never_rules import mine_never_rules
@@ -25,6 +26,7 @@ from sarl_core.mining.rules import Condition, Rule
 from sarl_core.shielding.decisions import deciding, ground_of, labels_at, regions
 from sarl_core.shielding.disagreement import disagreement, sampled_states
 from sarl_core.shielding.effects import change, verdicts
+from sarl_core.shielding.leeway import leeway_of
 
 
 def walk(n: int = 250) -> Demonstrations:
@@ -316,3 +318,49 @@ def test_to_forbid_all_but_one_label_is_to_demand_it(lander_like: Demonstrations
     found = disagreement(demanding, forbidding, lander_like.observations)
     assert found.different == 0
     assert found.difference.same == 0
+
+
+def test_edits_of_rules_that_forbid_are_counted_as_the_shield_decides() -> None:
+    never = mine_never_rules(DATA, epsilon=0.3, supp_min=0.05)
+    by_hand = manual_rule(
+        never,
+        [Ask("a", ">", 0.25)],
+        rule_id="manual.1",
+        action=None,
+        forbids=(2, 0),
+        demonstrations=DATA,
+    )
+    holds = by_hand.applies(DATA.observations)
+    assert by_hand.samples == holds.sum()
+    assert by_hand.confidence == (DATA.actions[holds, 0] == 1).mean()
+    assert (by_hand.forbids, by_hand.instead) == ((0, 2), (1,))
+    demands = manual_rule(
+        never, [Ask("b", ">", 0.8)], rule_id="manual.2", action=1, demonstrations=DATA
+    )
+    ground, expert = ground_of(never, DATA.observations), labels_of(never, DATA)
+    before = verdicts(ground, never, expert)
+    made = [Add(by_hand), Add(demands), Switch(never.rules[0].id, on=False)]
+    assert edits_from_json(edits_to_json(made), never, name="edits") == tuple(made)
+    edited = apply(never, made)
+    after = verdicts(ground, edited, expert)
+    for found in (before, after):
+        leeway = leeway_of(found.rule_set, DATA)
+        assert found.coverage == pytest.approx(leeway.coverage)
+        assert found.fidelity == pytest.approx(leeway.fidelity)
+        assert found.freedom == pytest.approx(leeway.freedom)
+    deciding_by_hand = demands.applies(DATA.observations)
+    places = {rule.id: at for at, rule in enumerate(edited.rules)}
+    assert after.decided[places["manual.2"]] == deciding_by_hand.sum()
+    assert after.decided[places["manual.1"]] == (holds & ~deciding_by_hand).sum()
+    assert after.decided[places[never.rules[0].id]] == 0
+    differs = disagreement(never, edited, DATA.observations).differs
+    assert change(before, after).by_dimension == tuple(differs.sum(axis=0).tolist())
+
+
+@pytest.mark.parametrize(
+    ("forbids", "problem"),
+    [((0, 1, 2), "leave one at least"), ((3,), "has no label 3"), ((), "has no action")],
+)
+def test_what_nobody_can_forbid_is_refused(forbids: tuple[int, ...], problem: str) -> None:
+    with pytest.raises(InputError, match=problem):
+        manual_rule(FINE, [], rule_id="manual.1", action=None, forbids=forbids)

@@ -46,10 +46,10 @@ def state_text(rule: Rule) -> str:
         rule: Any.
 
     Returns:
-        As "mined", "regrown", "pinned", "manual"; with ", off" where it is switched off.
+        As "mined", "probed", "regrown", "pinned", "manual"; with ", off" where it is switched off.
     """
     kind = "pinned" if rule.pinned else "regrown" if rule.regrown else "mined"
-    kind = "manual" if rule.origin == "manual" else kind
+    kind = kind if rule.origin == "mined" else rule.origin
     return kind if rule.enabled else f"{kind}, off"
 
 
@@ -88,12 +88,13 @@ def edits_change_text(effect: EditEffect, before: Verdicts, after: Verdicts, *, 
         for name, old, new in (
             ("Coverage", before.coverage, after.coverage),
             ("fidelity", before.fidelity, after.fidelity),
+            *([("freedom", before.freedom, after.freedom)] if after.rule_set.forbids else []),
         )
         if old != new and old == old and new == new  # NaN equals nothing
         for verb in ["rises" if new > old else "falls"]
     ]
     if moved:
-        numbers = " and ".join(moved)
+        numbers = " and ".join(filter(None, (", ".join(moved[:-1]), moved[-1])))
         text += f" {numbers[:1].upper()}{numbers[1:]}."
     return text
 

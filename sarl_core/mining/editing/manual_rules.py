@@ -39,6 +39,7 @@ def manual_rule(
     *,
     rule_id: str,
     action: int | None,
+    forbids: Sequence[int] = (),
     dimension: int = 0,
     demonstrations: Demonstrations | None = None,
 ) -> Rule:
@@ -50,6 +51,7 @@ def manual_rule(
             any, the rule applies always.
         rule_id: Its name.
         action: The label, None while none is chosen.
+        forbids: In its place, the labels that it forbids.
         dimension: Action dimension it speaks of.
         demonstrations: What it is counted on. They are left alone where the rule set was mined
             from others, because the shares of one set are of the same pairs.
@@ -67,14 +69,30 @@ def manual_rule(
             f"there is no action dimension {dimension}; the rules have {len(rule_set.actions)}"
         )
     conditions = _conditions(rule_set, asks)
-    if action is None:
+    forbidden = tuple(sorted(set(forbids)))
+    speaks_of = forbidden if action is None else (action,)
+    if not speaks_of:
         raise InputError("the rule has no action; choose what it says")
-    if not 0 <= action < rule_set.actions[dimension].n_labels:
-        raise InputError(
-            f"{rule_set.actions[dimension].name!r} has no label {action}; choose one of its "
-            f"{rule_set.actions[dimension].n_labels}"
-        )
-    rule = Rule(rule_id, dimension, conditions, action, 0.0, 0.0, 0.0, 0, origin="manual")
+    count = rule_set.actions[dimension].n_labels
+    for label in speaks_of:
+        if not 0 <= label < count:
+            raise InputError(
+                f"{rule_set.actions[dimension].name!r} has no label {label}; choose one of its "
+                f"{count}"
+            )
+    if len(forbidden) == count:
+        raise InputError("the rule forbids every action; leave one at least")
+    instead = tuple(label for label in range(count) if label not in forbidden) if forbids else ()
+    rule = Rule(
+        rule_id,
+        dimension,
+        conditions,
+        (instead or speaks_of)[0],
+        *(0.0, 0.0, 0.0, 0),
+        origin="manual",
+        forbids=forbidden,
+        instead=instead,
+    )
     _refuse_duplicate(rule_set, rule)
     if demonstrations is None or demonstrations.digest != rule_set.source.digest:
         return rule
@@ -171,7 +189,7 @@ def _refuse_duplicate(rule_set: RuleSet, rule: Rule) -> None:
     for other in rule_set.rules:
         if (
             other.id != rule.id
-            and (other.dimension, other.action) == (rule.dimension, rule.action)
+            and (other.dimension, _says(other)) == (rule.dimension, _says(rule))
             and region_of(other) == region_of(rule)
         ):
             instead = "pin it" if other.origin == "mined" else "move it up"
@@ -180,21 +198,32 @@ def _refuse_duplicate(rule_set: RuleSet, rule: Rule) -> None:
             raise InputError(f"rule {other.id} asks and says the same; {instead} instead")
 
 
+def _says(rule: Rule) -> int | tuple[int, ...]:
+    return rule.forbids or rule.action
+
+
 def _counted(rule_set: RuleSet, rule: Rule, demonstrations: Demonstrations) -> Rule:
     values = demonstrations.action_columns[:, rule.dimension]
     dimension = rule_set.actions[rule.dimension]
-    carries = dimension.labels_of(values) == rule.action
+    labels = dimension.labels_of(values)
+    carries = rule.obeyed_by(labels)
     holds = rule.applies(demonstrations.observations)
     samples = int(holds.sum())
     if not samples:
         return rule
     correct, labelled = int(carries[holds].sum()), int(carries.sum())
+    if rule.forbids:  # what is most frequent there comes in the place of what is forbidden
+        often = np.bincount(labels[holds], minlength=dimension.n_labels)
+        order = tuple(sorted(rule.instead, key=lambda label: -int(often[label])))
+        rule = replace(rule, action=order[0], instead=order)
     return replace(
         rule,
         support=samples / len(demonstrations),
         confidence=correct / samples,
         lift=correct * len(demonstrations) / (samples * labelled) if labelled else 0.0,
         samples=samples,
-        demonstrated_value=float(np.median(values[holds])) if dimension.is_interval else None,
+        demonstrated_value=float(np.median(values[holds]))
+        if dimension.is_interval and not rule.forbids
+        else None,
         box=box_of(rule, demonstrations.observations),
     )

@@ -22,6 +22,8 @@ def conflicts(of: Base, verdicts: Verdicts) -> None:
     """Placed rules that overrule others, with an example of each."""
     import pandas as pd
 
+    if verdicts.rule_set.forbids:
+        return  # they add up, so none takes a state from another
     st.header("Conflicts")
     if not verdicts.conflicts:
         st.caption("No placed rule takes a state from another rule that says something else.")

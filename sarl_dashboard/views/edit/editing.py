@@ -36,7 +36,8 @@ def editing(of: Base) -> None:
             wish = chosen_rule(of, rule, after)
             if wish:
                 form.begin(of, rule, changing=wish == "change")
-            part(of, rule, after)
+            if not of.rule_set.forbids:  # no tree of demands is cut here
+                part(of, rule, after)
     else:
         st.info(
             "No rule is in force at these thresholds. Lower one of them on the Thresholds page, or "

@@ -16,6 +16,7 @@ from sarl_core.explaining.words.edits import conflict_text, edits_change_text
 from sarl_core.mining.action_words import action_text
 from sarl_core.mining.editing.edits import Add, Change, next_manual_id
 from sarl_core.mining.editing.manual_rules import Ask, asks_of, manual_rule
+from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import number_text, sentence
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Operator, Rule
@@ -25,6 +26,7 @@ from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.state.url import set_url_choice
 from sarl_dashboard.text import escaped, in_full
 
+Says = int | tuple[int, ...]
 ABOVE, AT_MOST = "above", "at most"
 SIGNS: dict[str, Operator] = {ABOVE: ">", AT_MOST: "<="}
 MOST_CONFLICTS = 3
@@ -81,7 +83,7 @@ def begin(of: Base, rule: Rule | None = None, *, changing: bool = False) -> Draf
             for name, value in filled:
                 st.session_state[draft.key(name, row)] = value
         st.session_state[draft.key("dimension")] = rule.dimension
-        st.session_state[draft.key("action")] = rule.action
+        st.session_state[draft.key("action")] = rule.forbids or rule.action
     _drafts()[of.key] = draft
     return draft
 
@@ -121,12 +123,13 @@ class Filled:
     Attributes:
         asks: The conditions.
         dimension: Action dimension.
-        action: What the rule says there; None while that was not chosen.
+        action: What the rule demands there, or the labels that it forbids; None while that was
+            not chosen.
     """
 
     asks: list[Ask]
     dimension: int
-    action: int | None
+    action: Says | None
 
 
 def form(base: Base, now: Verdicts) -> None:
@@ -245,8 +248,8 @@ def _ask(base: Base, draft: Draft, row: int, at: int) -> Ask:
     return Ask(feature.name, SIGNS[sign], threshold)
 
 
-def _says(draft: Draft, rule_set: RuleSet) -> tuple[int, int | None]:
-    """The widgets for what the rule says."""
+def _says(draft: Draft, rule_set: RuleSet) -> tuple[int, Says | None]:
+    """The widgets for what the rule says; to forbid is offered among rules that do."""
     dimension = 0
     with st.container(horizontal=True, gap="small"):
         if len(rule_set.actions) > 1:
@@ -258,17 +261,32 @@ def _says(draft: Draft, rule_set: RuleSet) -> tuple[int, int | None]:
                 persist_state="session",
                 width=260,
             )
+        of = rule_set.actions[dimension]
+        options: list[Says] = list(range(of.n_labels))
+        if rule_set.forbids and of.n_labels > 1:
+            several = {
+                rule.forbids
+                for rule in rule_set.rules
+                if rule.dimension == dimension and len(rule.forbids) > 1
+            }
+            options = [*((label,) for label in range(of.n_labels)), *sorted(several), *options]
         action = st.selectbox(
             "Then",
-            range(rule_set.actions[dimension].n_labels),
+            options,
             index=None,
-            format_func=lambda label: action_text(label, rule_set.actions[dimension]),
+            format_func=lambda says: _says_text(says, of),
             key=draft.key("action"),
             persist_state="session",
             placeholder="choose what the rule says",
             width=310,
         )
     return dimension, action
+
+
+def _says_text(says: Says, dimension: LabelledDimension) -> str:
+    if isinstance(says, int):
+        return action_text(says, dimension)
+    return f"never {' or '.join(action_text(label, dimension) for label in says)}"
 
 
 def _rule(filling: Filling, filled: Filled) -> Rule | None:
@@ -282,7 +300,8 @@ def _rule(filling: Filling, filled: Filled) -> Rule | None:
             rule_set,
             asks,
             rule_id=filling.draft.changing or next_manual_id(rule_set, edits.history(filling.base)),
-            action=filled.action,
+            action=filled.action if isinstance(filled.action, int) else None,
+            forbids=filled.action if isinstance(filled.action, tuple) else (),
             dimension=filled.dimension,
             demonstrations=edits.demonstrations_for(filling.base.rule_set),
         )
@@ -299,13 +318,14 @@ def preview(filling: Filling, edit: Add | Change) -> None:
     st.markdown(f"**{escaped(sentence(rule, then.rule_set, evidence=False))}**")
     if not rule.conditions:
         st.warning(
-            "Without conditions the rule applies always, and comes before every mined rule of its "
-            "action.",
+            "Without conditions the rule applies always"
+            + ("." if rule.forbids else ", and comes before every mined rule of its action."),
             icon=":material/warning:",
         )
     index = next(at for at, one in enumerate(then.rule_set.rules) if one.id == rule.id)
     decides = int(then.decided[index])
-    sentences = [f"It would decide {decides:,} of {len(then.labels):,} {noun}s."]
+    would = "have a say in" if rule.forbids else "decide"
+    sentences = [f"It would {would} {decides:,} of {len(then.labels):,} {noun}s."]
     if then.right is not None and decides:
         sentences.append(f"The expert did as it says in {int(then.right[index]):,} of them.")
     sentences.append(

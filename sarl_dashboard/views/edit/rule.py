@@ -45,7 +45,8 @@ def chosen_rule(of: Base, rule: Rule, verdicts: Verdicts) -> str | None:
     with st.container(border=True, key="chosen_rule"):
         st.markdown(f"**{escaped(sentence(rule, rule_set))}**")
         at = next(at for at, one in enumerate(rule_set.rules) if one.id == rule.id)
-        decides = f"decides {counted(int(verdicts.decided[at]), edits.basis_of(of).noun)}"
+        states = counted(int(verdicts.decided[at]), edits.basis_of(of).noun)
+        decides = f"has a say in {states}" if rule.forbids else f"decides {states}"
         st.caption(f"{rule_set.name_of(rule)} · {state_text(rule)} · {decides}")
         with st.container(horizontal=True, gap="small"):
             for button in _buttons(rule, rule_set):
@@ -79,14 +80,17 @@ def _buttons(rule: Rule, rule_set: RuleSet) -> Iterator[Button]:
     else:
         yield Button("Switch on", "toggle_on", Switch(rule.id, True), "switch")
     if rule.origin == "mined":
-        hint = (
-            "A pinned rule stays in force when the thresholds move, and comes before those that "
-            "were only mined."
+        hint = "A pinned rule stays in force when the thresholds move" + (
+            "." if rule.forbids else ", and comes before those that were only mined."
         )
         if rule.pinned:
             yield Button("Unpin", "keep_off", Unpin(rule.id), "pin", hint)
         else:
             yield Button("Pin", "keep", Pin(rule), "pin", hint)
+    if rule.origin == "manual":
+        yield Button("Remove", "delete", Remove(rule.id), "remove")
+    if rule.forbids:  # they add up, so they have no order
+        return
     peers = peers_of(rule, rule_set.rules) if rule.placed else []
     hint = (
         "Its place among the placed rules of its action"
@@ -96,5 +100,3 @@ def _buttons(rule: Rule, rule_set: RuleSet) -> Iterator[Button]:
     for way, up, end in (("up", True, peers[:1]), ("down", False, peers[-1:])):
         last = end in ([], [rule.id])
         yield Button(f"Move {way}", f"arrow_{way}ward", Move(rule.id, up), way, hint, disabled=last)
-    if rule.origin == "manual":
-        yield Button("Remove", "delete", Remove(rule.id), "remove")

@@ -33,6 +33,14 @@ Places = NDArray[np.int64]
 TABLE_ROWS = 9
 PAGE_ROWS = 2_000  # that a browser is sent at once
 PAGE = "edit_page"
+_IN_ORDER = (
+    "Placed rules (manual or pinned) come first, in their order: the first that applies decides. "
+    "Mined rules never overlap."
+)
+_ADD_UP = (
+    "Rules that forbid add up: in a state everything is forbidden that one of them forbids there. "
+    "Where a rule demands an action, they have no say."
+)
 EVERY, TOUCHED = "All rules", "Edited"
 
 
@@ -81,9 +89,8 @@ def table(of: Base, verdicts: Verdicts) -> Rule | None:
         st.caption(
             (f"{len(order):,} of {several}. " if len(order) < len(rule_set) else f"{several}. ")
             + (f"Rows {first + 1:,} to {first + len(part):,}. " if pages > 1 else "")
-            + "Placed rules (manual or pinned) come first, in their order: the first that applies "
-            "decides. Mined rules never overlap. Click the box at the left of a row to edit its "
-            "rule."
+            + (_ADD_UP if rule_set.forbids else _IN_ORDER)
+            + " Click the box at the left of a row to edit its rule."
         )
     return chosen
 
@@ -217,13 +224,14 @@ def _with_numbers(verdicts: Verdicts, places: Places, known: dict[str, tuple[str
 
 def _columns(rule_set: RuleSet) -> dict[str, Any]:
     column = st.column_config
-    action, action_width = action_column(rule_set.actions, "What the rule says")
+    forbidding = [rule for rule in rule_set.rules if rule.forbids]
+    action, action_width = action_column(rule_set.actions, "What the rule says", forbidding)
     return {
         "On": column.CheckboxColumn(width=40, help="Whether a shield uses the rule"),
         "Kind": column.TextColumn(
             width=70,
-            help="Mined; regrown, with a part of the tree; pinned, so that it keeps its place; or "
-            "added by hand",
+            help="Mined; probed; regrown, with a part of the tree; pinned, so that it keeps its "
+            "place; or added by hand",
         ),
         "Rule": column.TextColumn(
             width=80, help="Its name: rules are numbered by their place in the set"
@@ -233,7 +241,10 @@ def _columns(rule_set: RuleSet) -> dict[str, Any]:
             width=570 - action_width, help="The conditions under which the rule applies"
         ),
         "Decides": column.NumberColumn(
-            width=80, format="localized", help="States in which it is the rule in force"
+            width=80,
+            format="localized",
+            help="States in which it is the rule in force; of one that forbids, in which it has a "
+            "say",
         ),
         "Expert agrees": column.ProgressColumn(
             width=112,

@@ -74,20 +74,26 @@ def _short(text: str, most: int = 44) -> str:
 def numbers(of: Base, before: Verdicts, after: Verdicts) -> None:
     """What the edits change at once, against the unedited set."""
     changed, noun = change(before, after), edits.basis_of(of).noun
+    forbids = after.rule_set.forbids
     on = [sum(rule.enabled for rule in one.rule_set.rules) for one in (before, after)]
     totals = (
         ("Rules in force", f"{on[1]:,}", f"{on[0]:,}"),
         ("Coverage", *(share_text(one.coverage, decimals=1) for one in (after, before))),
         ("Fidelity", *(share_text(one.fidelity, decimals=1) for one in (after, before))),
         ("Decided differently", f"{changed.different:,}", ""),
-        ("Conflicts", f"{sum(one.states for one in after.conflicts):,}", ""),
+        ("Freedom", *(share_text(one.freedom, decimals=1) for one in (after, before)))
+        if forbids
+        else ("Conflicts", f"{sum(one.states for one in after.conflicts):,}", ""),
     )
     meanings = (
         "Rules that are switched on",
         "Share of the states in which some rule applies",
-        "Share of the covered states in which the expert did as the rule in force says",
+        "Share of the covered states in which the expert did as the rule in force says"
+        + ", or nothing that is forbidden there" * forbids,
         "States of which the edited set says something else than the unedited one",
-        "States in which a placed rule overrules another that says something else",
+        "What the rules leave to choose from, in the mean of all states"
+        if forbids
+        else "States in which a placed rule overrules another that says something else",
     )
     sentence = edits_change_text(changed, before, after, states=noun)
     cards = [
