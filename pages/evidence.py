@@ -17,7 +17,7 @@ from sarl_dashboard.session import end_page
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.data import all_demonstrations, mined_data, require_demonstrations
 from sarl_dashboard.state.mined import fidelity_at
-from sarl_dashboard.state.thresholds import FORBID, chosen_epsilon, chosen_mode
+from sarl_dashboard.state.thresholds import BOTH, FORBID, chosen_epsilon, chosen_mode
 from sarl_dashboard.views.evidence.contradictions import show_contradictions
 from sarl_dashboard.views.evidence.evidence import chosen_evidence
 from sarl_dashboard.views.evidence.held_out import hold_out_choice
@@ -32,6 +32,14 @@ st.caption(
     "how many of them, each counted once because its steps are alike."
 )
 require_demonstrations()
+if chosen_mode() == BOTH:
+    st.info(
+        "This page holds rules against one share that they have to reach, and those that demand "
+        "and those that forbid have one each; choose one kind on the page Thresholds. What both "
+        "are worth together in other episodes stands there, and what each is on the page Rules.",
+        icon=":material/block:",
+    )
+    end_page()
 forbids = chosen_mode() == FORBID
 if forbids:
     st.caption(

@@ -15,7 +15,7 @@ from sarl_dashboard.state import in_force, rule_base
 from sarl_dashboard.state.compact_set import chosen_compact
 from sarl_dashboard.state.data import require_demonstrations
 from sarl_dashboard.state.mined import grown_trees, tried_on
-from sarl_dashboard.state.thresholds import FORBID, chosen_divider, chosen_mode, chosen_thresholds
+from sarl_dashboard.state.thresholds import DEMAND, chosen_divider, chosen_mode, chosen_thresholds
 from sarl_dashboard.text import escaped
 from sarl_dashboard.views.thresholds.combinations import combinations_choice
 from sarl_dashboard.views.thresholds.controls import mode_choice, show_controls
@@ -30,7 +30,7 @@ demonstrations = require_demonstrations()
 trees = grown_trees(demonstrations, chosen_divider())
 compact = chosen_compact(demonstrations)
 take_over()
-forbids = chosen_mode() == FORBID
+forbids = chosen_mode() != DEMAND
 st.caption(
     "A rule must apply to at least a certain share of the states (support), and the expert must "
     "have done there what it demands often enough (confidence), or what it forbids seldom enough "

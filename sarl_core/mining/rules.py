@@ -310,6 +310,8 @@ class Thresholds:
         max_depth: Longest rule, None without limit.
         never: Epsilon of its never-rules: most that the upper bound of a forbidden label's share
             may be; None where there are none.
+        demands: Whether there are rules that demand at them, before the never-rules where there
+            are some.
     """
 
     support: float
@@ -317,6 +319,7 @@ class Thresholds:
     lift: float = 0.0
     max_depth: int | None = None
     never: float | None = None
+    demands: bool = True
 
     def __post_init__(self) -> None:
         """Refuse what no rule set can have.

@@ -183,10 +183,14 @@ def sidebar(*, with_thresholds: bool = True) -> None:
             return
         lines = [
             f"Support at least **{limit_text(thresholds.support)}**",
-            f"Confidence at least **{limit_text(thresholds.confidence)}**"
-            if thresholds.never is None
-            else f"Rules that **forbid**, epsilon **{threshold_text(thresholds.never)}**",
         ]
+        if thresholds.demands:
+            lines.append(f"Confidence at least **{limit_text(thresholds.confidence)}**")
+        if thresholds.never is not None:
+            behind = " behind" * thresholds.demands
+            lines.append(
+                f"Rules that **forbid**{behind}, epsilon **{threshold_text(thresholds.never)}**"
+            )
         if not demonstrations.is_discrete:
             lines.append(f"Divider **{divider}**")
         if thresholds.lift:

@@ -118,7 +118,10 @@ def frame(rules: Sequence[Rule], rule_set: RuleSet, names: Sequence[str]) -> Any
     columns["Action"] = [[action] for action in columns["Action"]]
     columns["Rule"] = list(names)
     order: tuple[str, ...] = ("Rule", "Action", "When")
-    tried = held_out_columns(rules, least_confidence(rule_set.thresholds))
+    tried = held_out_columns(
+        rules,
+        [least_confidence(rule_set.thresholds, forbids=bool(rule.forbids)) for rule in rules],
+    )
     if tried:
         tried["Verdict"] = [[word] for word in tried["Verdict"]]
         # Next to what they compare with; the rarer measures go to the end.

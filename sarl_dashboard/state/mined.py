@@ -21,6 +21,7 @@ from sarl_core.mining.thresholds.landscape import Landscape, threshold_landscape
 from sarl_core.mining.thresholds.pareto import ParetoPoint, pareto_front
 from sarl_core.mining.tree import Learner, PolicyTree
 from sarl_core.mining.validation.holding_out import count_held_out, with_held_out
+from sarl_core.shielding.leeway import Leeway, leeway_of
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.data import (
     chosen_demonstrations,
@@ -160,13 +161,16 @@ def fidelity_at(thresholds: Thresholds) -> float:
     Rules that forbid overlap, so it is counted by states: right are those in which nothing that is
     forbidden there was done.
     """
-    demonstrations = chosen_demonstrations()
+    rule_set, demonstrations = rules_at(thresholds), chosen_demonstrations()
     if thresholds.never is None or demonstrations is None:
-        return rules_at(thresholds).fidelity
-    trees = grown_trees(demonstrations, chosen_divider())
-    support, epsilon = (thresholds.support,), (thresholds.never,)
-    point = mined_never_landscape(trees, support, epsilon, depth=thresholds.max_depth)
-    return float(point.fidelity[0, 0])
+        return rule_set.fidelity
+    return mined_leeway(rule_set, demonstrations).fidelity
+
+
+@cached()
+def mined_leeway(rule_set: RuleSet, demonstrations: Demonstrations) -> Leeway:
+    """What rules that forbid, alone or behind others, say of what they were mined from."""
+    return leeway_of(rule_set, demonstrations)
 
 
 def tried_on() -> Demonstrations | MinedData | None:

@@ -34,7 +34,6 @@ from sarl_dashboard.state.rule_files import (
 )
 from sarl_dashboard.state.thresholds import (
     DEMAND,
-    FORBID,
     MIN_DIVIDER,
     THRESHOLDS,
     chosen_divider,
@@ -146,7 +145,7 @@ def _thresholds_key() -> str:
     discrete = demonstrations is None or demonstrations.is_discrete
     key = repr((data_key(), MIN_DIVIDER if discrete else chosen_divider()))
     # Rules that forbid have other numbers than those that demand.
-    return key if chosen_mode() == DEMAND else f"{key} {FORBID}"
+    return key if chosen_mode() == DEMAND else f"{key} {chosen_mode()}"
 
 
 def _fixed_base(name: str) -> Base:

@@ -18,7 +18,7 @@ THRESHOLDS = "thresholds"
 """In an address: the rules are those at the thresholds."""
 MIN_DIVIDER, MAX_DIVIDER = 2, 16
 LEARNERS: tuple[LearnerChoice, ...] = ("auto", "exact", "histogram")
-DEMAND, FORBID = "demand", "forbid"
+DEMAND, FORBID, BOTH = "demand", "forbid", "both"
 MAX_LIFT = 20.0
 MAX_DEPTH = 64  # 0 is no limit
 _LEAST_EPSILON = 0.0001
@@ -76,12 +76,12 @@ def _number(name: str, default: float, low: float, high: float) -> float:
 
 
 def chosen_mode() -> str:
-    """Whether rules at the thresholds demand an action or forbid one (URL: mode)."""
-    return url_choice("mode", (DEMAND, FORBID), DEMAND)
+    """Whether rules at the thresholds demand an action, forbid one, or both (URL: mode)."""
+    return url_choice("mode", (DEMAND, FORBID, BOTH), DEMAND)
 
 
 def choose_mode(mode: str) -> None:
-    """Choose between rules that demand and rules that forbid; for callbacks."""
+    """Choose between rules that demand, rules that forbid, and both; for callbacks."""
     set_url_choice("mode", mode, DEMAND)
 
 
@@ -103,13 +103,14 @@ def chosen_limits() -> tuple[float, int | None]:
 def chosen_thresholds() -> Thresholds:
     """The thresholds in force (URL: support, confidence, and those of `chosen_limits`).
 
-    Of rules that forbid those of `never_thresholds`, which know no confidence and no lift.
+    Of rules that forbid alone those of `never_thresholds`, which know no confidence and no lift.
     """
     support = max(_number("support", FILTERED.support, 0.0, 1.0), least_support())
     lift, depth = chosen_limits()
     if chosen_mode() == FORBID:
         return never_thresholds(chosen_epsilon(), support, depth)
-    return Thresholds(support, chosen_confidence(), lift, depth)
+    never = chosen_epsilon() if chosen_mode() == BOTH else None
+    return Thresholds(support, chosen_confidence(), lift, depth, never)
 
 
 def threshold_values() -> dict[str, tuple[float, float]]:

@@ -7,17 +7,18 @@ import time
 from dataclasses import replace
 from functools import partial
 from html import unescape
+from pathlib import Path
 
 import pytest
 
-from sarl_core import RuleSet, grow_policy_trees, load_demonstrations
+from sarl_core import RuleSet, grow_policy_trees, load_demonstrations, mine_rules
 from sarl_core.explaining.report.provenance import mined_again, mining_command
 from sarl_core.explaining.words.cross_fit import judged_sentence
 from sarl_core.explaining.words.evidence import VERDICTS, held_out_text, verdict_counts
 from sarl_core.mining.editing.edits import Add, Switch, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.language import share_text
-from sarl_core.mining.never.never_rules import mine_never_rules
+from sarl_core.mining.never.never_rules import mine_at, mine_never_rules, with_never_rules
 from sarl_core.mining.validation.cross_fitting import cross_fit, judge_pairs
 from sarl_core.mining.validation.holding_out import hold_out, with_held_out
 from sarl_core.shielding.leeway import leeway_of
@@ -200,3 +201,45 @@ def test_rules_that_forbid_are_edited_and_in_force_on_every_page(rules: RuleSet)
         assert not app.exception
         assert not errors(app), page
         assert "edits" in app.query_params
+
+
+BOTH = FORBID | {"mode": "both", "confidence": "0.95", "support": "0.005"}
+
+
+def test_rules_that_demand_with_others_behind_them(tmp_path: Path) -> None:
+    """At these thresholds the command `mine --never 0.1` gives the same."""
+    trees = grow_policy_trees(LANDER)
+    demanding = mine_rules(trees, supp_min=0.005, conf_min=0.95)
+    both = with_never_rules(demanding, trees, 0.1)
+    leeway = leeway_of(both, LANDER)
+    app = open_page("thresholds", **BOTH)
+    shown = metrics(app)
+    assert shown["Rules"] == str(len(both))
+    for name in ("coverage", "fidelity", "freedom"):
+        assert shown[name.title()] == share_text(getattr(leeway, name), decimals=1)
+    assert "of the rules that demand alone" in texts(app)
+    app.switch_page(page_file("rules")).run()
+    assert len(app.dataframe[0].value) == len(both)
+    assert app.query_params["mode"] == "both"
+    assert "Rules that **forbid** behind, epsilon **0.1**" in texts(app)
+    for page in (
+        "what_if",
+        "replay",
+        "shield",
+        "export",
+        "report",
+        "difference",
+        "edit",
+        "overview",
+    ):
+        app.switch_page(page_file(page)).run()
+        assert not app.exception
+        assert not errors(app), page
+    assert "one share that they have to reach" in texts(open_page("evidence", **BOTH))
+    # What a file says is what its thresholds mean: both kinds, or one.
+    for rules in (both, demanding, mine_never_rules(trees, epsilon=0.1, supp_min=0.005)):
+        rules.save(tmp_path / "rules.json")
+        loaded = RuleSet.load(tmp_path / "rules.json")
+        assert loaded.thresholds == rules.thresholds
+        assert mined_again(loaded, trees)
+        assert mine_at(trees, loaded.thresholds).digest == rules.digest

@@ -19,7 +19,7 @@ from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.mining.growing.growth import EXACT_UP_TO
 from sarl_core.mining.language import counted, threshold_text
-from sarl_core.mining.never.never_rules import forbids_alone, mined_alike
+from sarl_core.mining.never.never_rules import forbids_alone, mine_at
 from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.mining.rules import NAMED_SETTINGS
 from sarl_core.mining.tree import PolicyTree
@@ -277,7 +277,7 @@ def mined_again(rule_set: RuleSet, trees: Sequence[PolicyTree] | None) -> bool:
     """
     if not trees:
         return False
-    again = mined_alike(trees, rule_set)
+    again = mine_at(trees, rule_set.thresholds)
     one, other = (
         [
             (rule.id, rule.dimension, rule.conditions, rule.action, rule.forbids)

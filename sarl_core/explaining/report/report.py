@@ -48,7 +48,7 @@ from sarl_core.mining.editing.renaming import renamed_rules
 from sarl_core.mining.envelope import with_splits
 from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.language import counted, merged_length, share_text
-from sarl_core.mining.never.never_rules import mined_alike
+from sarl_core.mining.never.never_rules import mine_at
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import cross_fit
@@ -455,6 +455,6 @@ def _elsewhere(
     if counts.leeway is None:
         judged, fidelity = fit.at(rule_set.thresholds), rule_set.fidelity
     else:
-        judged = fit.of(lambda of_fold: mined_alike(of_fold, rule_set))
+        judged = fit.of(lambda of_fold: mine_at(of_fold, rule_set.thresholds))
         fidelity = counts.leeway.fidelity
     return judged_sentence(judged), parting_text(fidelity, judged)

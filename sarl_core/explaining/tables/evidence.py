@@ -29,12 +29,12 @@ from sarl_core.mining.validation.stability import Stability
 Columns = dict[str, list[object]]
 
 
-def held_out_columns(rules: Sequence[Rule], threshold: float) -> Columns:
+def held_out_columns(rules: Sequence[Rule], least: Sequence[float]) -> Columns:
     """What the held-out episodes say of rules, to stand beside `rule_columns`.
 
     Args:
         rules: Some rules.
-        threshold: The minimum confidence.
+        least: What the confidence of each has to reach.
 
     Returns:
         Column name to one value a rule, the bound in percent; {} where nothing was held out.
@@ -43,7 +43,9 @@ def held_out_columns(rules: Sequence[Rule], threshold: float) -> Columns:
         return {}
     return {
         "Held out": [held_out_text(rule.held_out) for rule in rules],
-        "Verdict": [VERDICTS[verdict(rule, threshold)] for rule in rules],
+        "Verdict": [
+            VERDICTS[verdict(rule, needed)] for rule, needed in zip(rules, least, strict=True)
+        ],
         "Lower bound": [
             None if held is None or held.low is None else 100 * held.low
             for held in (rule.held_out for rule in rules)

@@ -12,7 +12,7 @@ import numpy as np
 from sarl_core.mining.action_words import says_text
 from sarl_core.mining.algorithm_1 import cut_nodes, rules_at
 from sarl_core.mining.language import conditions_text
-from sarl_core.mining.never.never_rules import mine_never_rules
+from sarl_core.mining.never.never_rules import mine_at
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds, name_at
 from sarl_core.mining.tree import PolicyTree, source_of
@@ -70,9 +70,8 @@ def top_rules(trees: Sequence[PolicyTree], thresholds: Thresholds, most: int) ->
 
 
 def _top_never_rules(trees: Sequence[PolicyTree], at: Thresholds, most: int) -> TopRules:
-    """The same of rules that forbid, of which there are few enough to make them all."""
-    assert at.never is not None
-    every = mine_never_rules(trees, epsilon=at.never, supp_min=at.support, max_depth=at.max_depth)
+    """The same where rules forbid, of which there are few enough to make them all."""
+    every = mine_at(trees, at)
     top: list[Rule] = []
     for dimension in range(len(trees)):
         top += sorted(every.of_dimension(dimension), key=lambda rule: -rule.samples)[:most]

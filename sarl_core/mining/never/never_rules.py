@@ -132,19 +132,18 @@ def with_never_rules(rule_set: RuleSet, trees: Sequence[PolicyTree], epsilon: fl
     )
 
 
-def mine_at(trees: Sequence[PolicyTree], thresholds: Thresholds, *, alone: bool = True) -> RuleSet:
-    """Mine rules of either kind.
+def mine_at(trees: Sequence[PolicyTree], thresholds: Thresholds) -> RuleSet:
+    """Mine rules of either kind, or of both.
 
     Args:
         trees: One an action dimension.
-        thresholds: Of rules that forbid where they have an epsilon, else of rules that demand.
-        alone: Whether rules that forbid stand alone; else behind rules that demand.
+        thresholds: Of rules that demand, that forbid, or that demand with others behind them.
 
     Returns:
         The rules.
     """
     support, depth, epsilon = thresholds.support, thresholds.max_depth, thresholds.never
-    if epsilon is not None and alone:
+    if epsilon is not None and not thresholds.demands:
         return mine_never_rules(trees, epsilon=epsilon, supp_min=support, max_depth=depth)
     demanding = mine_rules(
         trees,
@@ -154,19 +153,6 @@ def mine_at(trees: Sequence[PolicyTree], thresholds: Thresholds, *, alone: bool 
         max_depth=depth,
     )
     return demanding if epsilon is None else with_never_rules(demanding, trees, epsilon)
-
-
-def mined_alike(trees: Sequence[PolicyTree], rule_set: RuleSet) -> RuleSet:
-    """The rules of trees at the thresholds of others, and of the same kind.
-
-    Args:
-        trees: One an action dimension.
-        rule_set: Rules whose thresholds count, and whether they demand or forbid.
-
-    Returns:
-        The rules.
-    """
-    return mine_at(trees, rule_set.thresholds, alone=forbids_alone(rule_set))
 
 
 def forbids_alone(rule_set: RuleSet) -> bool:
@@ -189,7 +175,7 @@ def never_thresholds(
     """
     must = "epsilon, the most that a forbidden action's share may be, must be a number"
     require(epsilon, Real, must, "give a share above 0 and below 1, as 0.1")
-    return Thresholds(supp_min, 1.0, 0.0, max_depth, never=float(epsilon))
+    return Thresholds(supp_min, 1.0, 0.0, max_depth, never=float(epsilon), demands=False)
 
 
 def never_rules_of(

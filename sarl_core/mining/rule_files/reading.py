@@ -402,7 +402,11 @@ class _Document(DocumentPart, Generic[_Held]):
             rules,
             actions,
             Source(self.env_id, features, mined.digest, mined.steps, mined.episodes),
-            Thresholds(**asdict(self.thresholds)),
+            Thresholds(
+                **asdict(self.thresholds),
+                demands=self.thresholds.never is None
+                or any(one.kind == "do" for one in self.rules),
+            ),
             self.divider,
             self.cut,
             self.learner,

@@ -164,9 +164,9 @@ def best_lower_bound(episodes: int) -> float:
     return held_out_of([1] * episodes, [1] * episodes).low or 0.0
 
 
-def least_confidence(thresholds: Thresholds) -> float:
-    """What the confidence of rules has to reach; of rules that forbid all but epsilon."""
-    return thresholds.confidence if thresholds.never is None else 1.0 - thresholds.never
+def least_confidence(thresholds: Thresholds, *, forbids: bool) -> float:
+    """What the confidence of a rule has to reach: of one that forbids, all but epsilon."""
+    return 1.0 - (thresholds.never or 0.0) if forbids else thresholds.confidence
 
 
 def verdict(rule: Rule, threshold: float) -> Verdict:

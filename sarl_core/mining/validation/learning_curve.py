@@ -83,7 +83,7 @@ def learning_curve(
 
     Args:
         demonstrations: What rules are mined from, E episodes.
-        thresholds: Of every rule set; with an epsilon of rules that forbid, and no others.
+        thresholds: Of every rule set.
         divider: Number of intervals of continuous dimensions.
         learner: What grows the trees.
         held_out: What every rule set is tried on; where not given, the episodes that come later

@@ -17,7 +17,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
 from sarl_core.mining.applications import Applications, applications
 from sarl_core.mining.growing.growth import grow_policy_trees
-from sarl_core.mining.never.never_rules import mined_alike
+from sarl_core.mining.never.never_rules import mine_at
 from sarl_core.mining.rule_order import rules_for
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Operator, Rule
@@ -229,7 +229,7 @@ def resampled(
     trees = grow_policy_trees(
         _drawn(demonstrations, drawn), divider=rule_set.divider, learner=rule_set.learner
     )
-    mined = mined_alike(trees, rule_set)
+    mined = mine_at(trees, rule_set.thresholds)
     overlap, like = _most_alike(rule_set, own, mined, demonstrations)
     known: dict[int, dict[tuple[int, Operator], float]] = {}
     thresholds = np.full(len(sides), np.nan)

@@ -76,7 +76,7 @@ def chosen_evidence() -> RuleSetEvidence:
 def _findings(evidence: RuleSetEvidence) -> Findings:
     rule_set, held_out = evidence.rule_set, evidence.parts.held_out
     rules = tuple(sorted(rule_set, key=lambda rule: -rule.samples))
-    threshold = least_confidence(rule_set.thresholds)
+    threshold = least_confidence(rule_set.thresholds, forbids=rule_set.forbids)
     missing = more_episodes(rules, evidence.episodes, threshold)
     if not evidence.held_out:
         return Findings(rules, missing, threshold, None, (None,) * len(rules))

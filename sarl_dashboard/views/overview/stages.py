@@ -105,11 +105,12 @@ def _rules() -> Stage:
     if not rule_base.at_thresholds():
         return Stage("Rules", True, f"{in_force.title()} chosen", "thresholds.py")
     thresholds = chosen_thresholds()
-    at = f"support at least {limit_text(thresholds.support)}, " + (
-        f"confidence at least {limit_text(thresholds.confidence)}"
-        if thresholds.never is None
-        else f"forbidden what the expert does in at most {limit_text(thresholds.never)}"
-    )
+    limits = [f"support at least {limit_text(thresholds.support)}"]
+    if thresholds.demands:
+        limits.append(f"confidence at least {limit_text(thresholds.confidence)}")
+    if thresholds.never is not None:
+        limits.append(f"forbidden what the expert does in at most {limit_text(thresholds.never)}")
+    at = ", ".join(limits)
     moved = thresholds != FILTERED
     return Stage(
         "Thresholds", moved, f"{'set: ' if moved else 'the usual ones, '}{at}", "thresholds.py"

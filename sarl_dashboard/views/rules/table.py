@@ -42,7 +42,7 @@ ORDERS = {
 
 def nothing_in_force(thresholds: Thresholds) -> None:
     """What to do where no rule is in force."""
-    if thresholds.never is not None:
+    if thresholds.never is not None and not thresholds.demands:
         st.info(
             f"No part of the tree has a support of at least {limit_text(thresholds.support)} and "
             "an action whose share there is shown to be at most "

@@ -33,6 +33,7 @@ from sarl_dashboard.state.rule_files import (
     compact_sets,
 )
 from sarl_dashboard.state.thresholds import (
+    BOTH,
     DEMAND,
     FORBID,
     MAX_DIVIDER,
@@ -64,11 +65,11 @@ _TOO_LOW = ". The trees of this file do not reach so far down; mine its steps ag
 _SHORT = {COMPACT: "Compact", COMBINED: "Two features", FEWEST: "Fewest"}
 
 
-_MODES = {DEMAND: "Rules that demand", FORBID: "Rules that forbid"}
+_MODES = {DEMAND: "Rules that demand", FORBID: "Rules that forbid", BOTH: "Both"}
 
 
 def mode_choice() -> None:
-    """Whether rules at the thresholds say what to do, or what never to do (URL: mode)."""
+    """Whether rules at the thresholds say what to do, what never to do, or both (URL: mode)."""
     # The widget follows the URL, so a link and the browser's "back" both reach it.
     st.session_state["_mode_choice"] = chosen_mode()
     st.segmented_control(
@@ -82,7 +83,8 @@ def mode_choice() -> None:
         help=with_words(
             "Rules that demand say what to do. Rules that forbid, never-rules, say what not to do "
             "and leave the rest to whoever acts. Rarely done is not unsafe: they say what the "
-            "expert had no need of."
+            "expert had no need of. Both: where a rule that demands applies it decides, and "
+            "elsewhere those that forbid."
         ),
     )
 
@@ -152,7 +154,9 @@ def show_controls(
                 on_change=leave_compact,
                 help=word_help("divider"),
             )
-        if not display.forbids:
+        if thresholds.never is not None and thresholds.demands:
+            epsilon_slider(moved)
+        elif not display.forbids:
             named_settings(thresholds, rule_base.compact_name() if display.compact else None)
     stay_beside()
     point = display.point(thresholds)
@@ -164,9 +168,9 @@ def show_controls(
     )
     if everything:
         elsewhere_notice(thresholds, float(point.fidelity[0, 0]))
-    if not display.forbids:
+    if thresholds.never is None:
         show_recommendation(display, thresholds)
-    upwards = thresholds.confidence if thresholds.never is None else thresholds.never
+    upwards = thresholds.confidence if thresholds.demands else thresholds.never or 0.0
     across, down = mark_place(landscape, thresholds.support, upwards)
     ring = "block" if display.compact is None else "none"
     st.html(placed("maps", across=f"{across:.5f}", down=f"{down:.5f}", ring=ring))

@@ -24,9 +24,14 @@ from sarl_dashboard.components.journey.words import with_words, word_help
 from sarl_dashboard.components.settings import switch
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.compact_set import Compact
-from sarl_dashboard.state.mined import mined_landscape, mined_never_landscape
+from sarl_dashboard.state.data import chosen_demonstrations, data_parts
+from sarl_dashboard.state.mined import (
+    mined_landscape,
+    mined_leeway,
+    mined_never_landscape,
+    mined_rules,
+)
 from sarl_dashboard.state.thresholds import (
-    DEMAND,
     FORBID,
     MAX_DEPTH,
     MAX_LIFT,
@@ -68,7 +73,7 @@ class Display:
         layers: What the two figures show.
         surfaces: Whether as the paper's surfaces, and not as maps.
         paper_grid: Whether on the paper's grid.
-        forbids: Whether rules at the thresholds forbid.
+        forbids: Whether rules at the thresholds forbid, and none of them demands.
     """
 
     trees: tuple[PolicyTree, ...]
@@ -106,6 +111,8 @@ class Display:
         """
         if self.compact is not None:
             return _compact_point(self.compact.counted, self.dimension)
+        if thresholds.never is not None and thresholds.demands:
+            return self._both(thresholds)
         if thresholds.never is not None:
             return self._never((thresholds.support,), (thresholds.never,), thresholds)
         return self._part((thresholds.support,), (thresholds.confidence,), thresholds)
@@ -115,6 +122,26 @@ class Display:
     ) -> NeverLandscape:
         whole = mined_never_landscape(self.trees, supports, epsilons, depth=limits.max_depth)
         return whole if self.dimension is None else whole.dimensions[self.dimension]
+
+    def _both(self, thresholds: Thresholds) -> NeverLandscape:
+        """Of rules that demand with others behind them, which no landscape counts."""
+        demonstrations = chosen_demonstrations()
+        assert demonstrations is not None
+        rules = mined_rules(self.trees, thresholds, data_parts())
+        count = 1 if self.dimension is None else len(rules.actions)
+        if self.dimension is not None:
+            rules = replace(rules, rules=rules.of_dimension(self.dimension))
+        leeway, nowhere = mined_leeway(rules, demonstrations), np.zeros(1)
+        return NeverLandscape(
+            nowhere,
+            nowhere,
+            np.array([[len(rules)]]),
+            np.array([[rules.mean_length]]),
+            # Of one dimension alone: in all others no rule applies.
+            np.array([[count * leeway.coverage]]),
+            np.array([[leeway.fidelity]]),
+            np.array([[1.0 - count * (1.0 - leeway.freedom)]]),
+        )
 
     def _part(
         self, supports: tuple[float, ...], confidences: tuple[float, ...], limits: Thresholds
@@ -184,7 +211,7 @@ def chosen_display(
 def more() -> None:
     """What changes the whole plane, and is rarely needed."""
     with st.popover("More", icon=":material/tune:"):
-        if chosen_mode() == DEMAND:
+        if chosen_mode() != FORBID:
             st.slider(
                 "Minimum lift",
                 0.0,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import streamlit as st
 
 from sarl_core.explaining.figures import thresholds as figures
@@ -10,6 +12,7 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import Landscape
 from sarl_dashboard.components.places import placed
 from sarl_dashboard.session import is_dark
+from sarl_dashboard.state.thresholds import BOTH, chosen_mode
 from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.moves import take_click
 
@@ -54,7 +57,13 @@ def show_maps(display: Display, landscape: Landscape | NeverLandscape) -> None:
             if display.compact is None
             else "The compact rules are not cut at thresholds, so no cell is marked."
         )
+        + " The maps are of the rules that demand alone." * (chosen_mode() == BOTH)
     )
+
+
+def _drawn(thresholds: Thresholds) -> Thresholds:
+    """Of rules of both kinds, the figures are of those that demand."""
+    return replace(thresholds, never=None) if thresholds.demands else thresholds
 
 
 def show_surfaces(
@@ -68,8 +77,8 @@ def show_surfaces(
         thresholds: Those in force.
     """
     marked, styles = display.compact is None, figures.styles_of(landscape)
-    upwards = thresholds.confidence if thresholds.never is None else thresholds.never
-    point = display.point(thresholds)
+    upwards = thresholds.confidence if thresholds.demands else thresholds.never or 0.0
+    point = display.point(_drawn(thresholds))
     for column, layer in zip(st.columns(2), display.layers, strict=True):
         with column:
             st.markdown(f"**{styles[layer].title}**")
@@ -91,4 +100,8 @@ def show_surfaces(
                 config={"displaylogo": False},
                 alt=f"{styles[layer].title} as a surface",
             )
-    st.caption("Drag to turn." + (" The dot marks the present thresholds." if marked else ""))
+    st.caption(
+        "Drag to turn."
+        + " The dot marks the present thresholds." * marked
+        + " The surfaces are of the rules that demand alone." * (chosen_mode() == BOTH)
+    )

@@ -9,7 +9,7 @@ from sarl_core.mining.thresholds.steps import neat_point
 from sarl_core.mining.tree import PolicyTree
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.thresholds import (
-    DEMAND,
+    FORBID,
     choose_mode,
     choose_thresholds,
     chosen_limits,
@@ -59,7 +59,7 @@ def use(setting: Thresholds) -> None:
 
 
 def use_mode(mode: str) -> None:
-    """Put rules at the thresholds in force that demand, or that forbid; for callbacks."""
+    """Put rules at the thresholds in force that demand, that forbid, or both; for callbacks."""
     choose_mode(mode)
     st.session_state.pop("_clicked", None)
     rule_base.choose()
@@ -91,7 +91,7 @@ def take_click(key: str, trees: tuple[PolicyTree, ...]) -> None:
         if key == "pareto":
             clicked = neat_point(trees, Thresholds(support, other, *chosen_limits()))
             support, other = clicked.support, clicked.confidence
-        name = "confidence" if chosen_mode() == DEMAND else "epsilon"
+        name = "epsilon" if chosen_mode() == FORBID else "confidence"
         st.session_state["_clicked"] = {"support": max(support, least_support()), name: other}
     if clicked_cell := st.session_state.get("_clicked"):
         move(**clicked_cell)

@@ -17,7 +17,7 @@ from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_dashboard.components.journey.words import with_words, word_help
 from sarl_dashboard.state.thresholds import least_support
 
-_UNBROKEN = "Here: in which it did nothing that is forbidden."
+_UNBROKEN = "Here: in which it kept to all that apply."
 _ELSEWHERE = "Elsewhere: in an episode that the rules were not mined from, on average."
 
 
