@@ -134,12 +134,20 @@ def test_they_are_held_against_a_log(typed, tmp_path, options):
     assert len(pd.read_csv(folder / "rules.csv")) == len(rules)
 
 
-def test_where_they_are_not_understood_that_is_said(typed, tmp_path):
-    out = tmp_path / "never.json"
-    assert typed("mine", CART, "--never", "0.1", "--out", str(out))[0] == 0
-    code, _, error = typed("diff", str(out), str(out))
-    assert code == 2
-    assert "some of these forbid one" in error
+def test_they_are_compared_with_rules_that_demand(typed, tmp_path):
+    never, demanding = tmp_path / "never.json", tmp_path / "demanding.json"
+    assert typed("mine", CART, "--never", "0.1", "--out", str(never))[0] == 0
+    assert typed("mine", CART, "--setting", "filtered", "--out", str(demanding))[0] == 0
+    code, out, _ = typed("diff", str(never), str(never), "--demonstrations", CART)
+    assert code == 0
+    assert "decide none of" in out
+    code, out, _ = typed("diff", str(never), str(demanding), "--demonstrations", CART, "--json")
+    assert code == 0
+    found = json.loads(out)
+    assert all(rule["forbids"] for rule in found["removed"])
+    # With two actions, to forbid one is to demand the other.
+    assert found["dimensions"][0]["says"] == ["push left", "push right", None]
+    assert 0 < found["states"]["different"] < found["states"]["count"]
 
 
 def test_they_are_taken_out_one_by_one(typed, tmp_path):
