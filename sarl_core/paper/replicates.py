@@ -222,10 +222,20 @@ def fingerprints(env_id: str, count: int) -> dict[str, dict[str, str]]:
     replicates = replicates_of(env_id, count)
     return {
         "recordings": {str(one.recording): demonstrations_of(one).digest for one in replicates},
-        "experts": {
-            one.name: hashlib.blake2b(one.expert.read_bytes(), digest_size=16).hexdigest()
-            for one in replicates
-        },
+        "experts": expert_digests(env_id, count),
+    }
+
+
+def expert_digests(env_id: str, count: int) -> dict[str, str]:
+    """Digests of the experts of an environment's recordings, by their names.
+
+    Args:
+        env_id: One of `environments`.
+        count: Number of recordings.
+    """
+    return {
+        one.name: hashlib.blake2b(one.expert.read_bytes(), digest_size=16).hexdigest()
+        for one in replicates_of(env_id, count)
     }
 
 
