@@ -226,7 +226,7 @@ def test_compact_rules_are_told_by_their_budget_and_their_card() -> None:
     page = Page(make_report(rule_set, data, **PLAIN, card=card).html)
     assert f"The budget was {card['budget']:,} rules" in page.text
     assert f"{card['reported']['mean']:.0f}" in page.text
-    assert f"made from more than these: from {rule_set.source.steps:,} states" in page.text
+    assert f"made from these states and more, {rule_set.source.steps:,} states" in page.text
     assert "plane" not in {a.get("class") for tag, a in page.tags if tag == "table"}
 
 

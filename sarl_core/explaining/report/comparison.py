@@ -257,7 +257,11 @@ def compared(results: Sequence[Result]) -> Compared | None:
                 for one in results
                 if one.cut
             ),
-            *(f"{one.name}: these rules harm the agent." for one in results if one.effect == HARMS),
+            *(
+                f"{one.name}: these rules harm the agent."
+                for one in results
+                if one.effect == HARMS and one.freedom != 0.0
+            ),
             *(f"{one.name}: {_policy(one)}" for one in results if one.freedom == 0.0),
         ),
         headings=tuple(_HEADINGS[place] for place in known),

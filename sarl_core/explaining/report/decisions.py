@@ -66,8 +66,8 @@ def decisions(
     if worst is not None and not certified.verdicts:
         yield OpenQuestion(
             f"Can it be borne that up to {share_text(worst[0])} of the episodes fail?",
-            f"It is the upper end of what {counted(worst[1], 'episode')} tell. Nothing lower is "
-            "certified (section 5).",
+            f"It is the upper end of what {counted(worst[1], 'episode')} tell; where there are two "
+            "tests, of the worse. No limit is certified.",
         )
     if counts.coverage < 1.0:
         yield OpenQuestion(
@@ -78,7 +78,7 @@ def decisions(
     if gaps.unused:
         yield OpenQuestion(
             f"Is it right that no rule looks at {gaps.unused}?",
-            "It was recorded, and the rules decide without it.",
+            "Recorded, and the rules decide without.",
         )
     if gaps.doubts:
         names = listed(gaps.doubts[0].names, most=4)
@@ -88,7 +88,7 @@ def decisions(
             f"{gaps.doubts[0].text.removesuffix('.')} ({names}).{more}",
         )
     if sign_off is not None and not sign_off.approvals:
-        yield OpenQuestion("Are the rules approved?", "Nobody has approved them yet.")
+        yield OpenQuestion("Are the rules approved as they stand?", "Nobody has approved them yet.")
 
 
 def _of_pair(pair: Pair) -> OpenQuestion:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.report.rule_set_card import RuleSetCard
 from sarl_core.explaining.report.tally import Share, Tally
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import RuleSet
@@ -12,7 +13,7 @@ from sarl_core.shielding.leeway import Leeway
 
 
 def demonstrated(
-    rule_set: RuleSet, demonstrations: Demonstrations, counts: Tally
+    rule_set: RuleSet, demonstrations: Demonstrations, counts: Tally, card: RuleSetCard
 ) -> tuple[str, ...]:
     """What was shown, and what rules came of it.
 
@@ -20,6 +21,7 @@ def demonstrated(
         rule_set: The rules.
         demonstrations: They are about.
         counts: The rules on them.
+        card: Of the rules.
 
     Returns:
         Sentences.
@@ -34,21 +36,25 @@ def demonstrated(
     if counts.leeway is not None:
         return (acted, *_forbidding(rule_set, counts, counts.leeway))
     return (
-        f"{acted} {origin_text(rule_set, demonstrations, counts)}",
+        f"{acted} {origin_text(rule_set, demonstrations, counts, card)}",
         f"{_coverage_text(counts)}{_followed(counts)}.",
     )
 
 
-def origin_text(rule_set: RuleSet, demonstrations: Demonstrations, counts: Tally) -> str:
+def origin_text(
+    rule_set: RuleSet, demonstrations: Demonstrations, counts: Tally, card: RuleSetCard
+) -> str:
     """What rules were made from, as a sentence.
 
     Args:
         rule_set: The rules.
         demonstrations: Of the report.
         counts: The rules on them.
+        card: Of the rules.
 
     Returns:
-        As "The 6 rules were made from more than that: from 18,517 states in 86 episodes.".
+        As "The 6 rules were read off from these."; where the expert was asked anew while they were
+        made, that too, and whether they were moved away from what it said.
     """
     number = sum(rule.enabled for rule in rule_set.rules)
     rules = "The rule was" if number == 1 else f"The {number:,} rules were"
@@ -67,8 +73,15 @@ def origin_text(rule_set: RuleSet, demonstrations: Demonstrations, counts: Tally
     if counts.same:
         return f"{rules} read off from these."
     size = f"{counted(source.steps, 'state')} in {counted(source.episodes, 'episode')}"
-    if source.steps > whole.steps:
-        return f"{rules} made from more than these: from {size} (section 2)."
+    moved = (
+        ". Then their thresholds were moved to where the rules achieve more, so they follow it "
+        "less closely"
+    )
+    if card.rounds and source.steps > whole.steps:
+        return (
+            f"{rules} made from these states and more, {size}, in each of which the expert was "
+            f"asked anew what it would do{moved if card.refined else ''}."
+        )
     return f"{rules} made from other data: {size}."
 
 

@@ -134,7 +134,7 @@ def effects(
     """
     if not pairs:
         if reported.mean is not None:
-            yield _achieved(reported)
+            yield f"{(achieved := _achieved(reported))[0].upper()}{achieved[1:]}"
         lacking = "Nothing" if not results else "No agent under the rules"
         yield (
             f"{lacking} was measured for this report: what the rules do to whoever is held to them "
@@ -166,7 +166,7 @@ def _achieved(reported: ReportedEpisodes) -> str:
     over = f" over {counted(reported.episodes, 'episode')}" if reported.episodes else ""
     failed = "" if reported.rate is None else f"; failures: {rate_text(reported.rate)}"
     return (
-        "Where the rules were made, an agent that follows them had a mean return of "
+        "when the rules were made, an agent that follows them had a mean return of "
         f"{number_text(reported.mean)}{over}{failed}."
     )
 
@@ -348,7 +348,7 @@ def certainty(pairs: Sequence[Pair], reported: ReportedEpisodes) -> Iterator[str
     else:
         yield f"{rests} 95 % intervals: {'; '.join(intervals)}."
     if reported.mean is not None:
-        yield _achieved(reported)
+        yield f"A second test: {_achieved(reported)}"
 
 
 def _intervals(pair: Pair) -> Iterator[str]:
@@ -360,7 +360,7 @@ def _intervals(pair: Pair) -> Iterator[str]:
         yield f"failures {who} {low} to {high}"
     if one.gained is not None:
         ends = [telling_text(end) for end in (one.gained.low, one.gained.high)]
-        yield f"the mean return of {pair.agent} changes by {ends[0]} to {ends[1]}"
+        yield f"mean return with the rules less that of {pair.agent} alone {ends[0]} to {ends[1]}"
 
 
 def failures_at_most(pairs: Sequence[Pair], reported: ReportedEpisodes) -> tuple[float, int] | None:

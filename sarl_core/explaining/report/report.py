@@ -18,6 +18,7 @@ from sarl_core.agents.agent import Agent, has_expert
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.names import names_of
 from sarl_core.demonstrations.recoding import recoded
+from sarl_core.documents import fitting
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.errors import InputError, SarlError, require
 from sarl_core.explaining.report.certificates import certificates_part
@@ -32,7 +33,7 @@ from sarl_core.explaining.report.provenance import (
     how_to_measure,
     mined_again,
 )
-from sarl_core.explaining.report.rule_set_card import reported_of
+from sarl_core.explaining.report.rule_set_card import RuleSetCard
 from sarl_core.explaining.report.rules import in_order, rules_part
 from sarl_core.explaining.report.slides import slides_document
 from sarl_core.explaining.report.summary import summary_part
@@ -261,11 +262,13 @@ def make_report(
     about = demonstrations.env_id or rule_set.source.env_id
     uncovered = gaps(rule_set, demonstrations, counts, examples)
     elsewhere = _elsewhere(as_given, demonstrations, trees, counts)
+    entries = fitting(card, RuleSetCard)
     plain_title = f"Rules for {task_name(about)}" if about else "Rules from demonstrations"
     parts: dict[str, Any] = {
         "title": wishes.cover.title.strip() or plain_title,
         "cover": wishes.cover,
         "forbids": rule_set.forbids,
+        "decides": counts.decides,
         "summary": summary_part(
             rule_set,
             demonstrations,
@@ -274,7 +277,7 @@ def make_report(
             certified=certified,
             gaps=uncovered,
             elsewhere=elsewhere,
-            reported=reported_of(card),
+            card=entries,
             sign_off=wishes.sign_off,
         ),
         "key_numbers": _key_numbers(rule_set, counts),
@@ -283,7 +286,7 @@ def make_report(
         "elsewhere": elsewhere,
         "demonstrations": demonstrations_part(rule_set, demonstrations, counts),
         "thresholds": thresholds_part(rule_set, counts, trees, card),
-        "rules": rules_part(rule_set, demonstrations, counts, order, examples),
+        "rules": rules_part(rule_set, demonstrations, counts, order, examples, entries),
         "pictures": _about_pictures(examples, without, wishes, demonstrations),
         "frame_size": examples.size if examples is not None else (0, 0),
         "gaps": uncovered,

@@ -25,6 +25,11 @@ class RuleSetCard(Struct):
     seed: Count | None = None
     command: str | None = None
 
+    @property
+    def reported_episodes(self) -> ReportedEpisodes:
+        """What an agent that follows the rules achieved; without a mean where it is not said."""
+        return fitting(self.reported, ReportedEpisodes)
+
 
 class ReportedEpisodes(Struct):
     """What a card may say of the episodes in which its rules were tried."""
@@ -53,18 +58,6 @@ class ReportedEpisodes(Struct):
         unknown = self.undecided if self.undecided is not None else self.cut or 0
         share = self.failures / self.episodes
         return Rate(self.failures, self.episodes, share, low, high, unknown)
-
-
-def reported_of(card: Mapping[str, Any] | None) -> ReportedEpisodes:
-    """What an agent that follows the rules achieved where they were made.
-
-    Args:
-        card: Of the rule file, None without one.
-
-    Returns:
-        Without a mean where the card does not say.
-    """
-    return fitting(fitting(card, RuleSetCard).reported, ReportedEpisodes)
 
 
 def read_card(rules: Path) -> Mapping[str, Any] | None:

@@ -11,6 +11,7 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.figures.distributions import feature_rows
 from sarl_core.explaining.report.origin import origin_text
 from sarl_core.explaining.report.rule_cards import Card, rule_card, tags
+from sarl_core.explaining.report.rule_set_card import RuleSetCard
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.action_words import says_text
 from sarl_core.mining.language import conditions_text, share_text
@@ -119,6 +120,7 @@ def rules_part(
     tally: Tally,
     order: tuple[Sequence[int], Sequence[int]],
     examples: Examples | None,
+    card: RuleSetCard,
 ) -> Rules:
     """The rules, the first in full.
 
@@ -128,6 +130,7 @@ def rules_part(
         tally: The rules on them.
         order: As `in_order` gives it.
         examples: Frames at which rules applied, None without pictures.
+        card: Of the rules.
 
     Returns:
         The part of the report.
@@ -146,7 +149,7 @@ def rules_part(
     lines = tuple(_line(rule_set, index) for index in rest[:MOST_IN_TABLE])
     return Rules(
         introduction=(
-            *_introduction(rule_set, demonstrations, tally, len(full), len(rest)),
+            *_introduction(rule_set, demonstrations, tally, card, len(full), len(rest)),
             *_on_combinations(rule_set, full),
         ),
         beneath=_beneath(rule_set),
@@ -195,7 +198,12 @@ def _on_combinations(rule_set: RuleSet, full: Sequence[int]) -> tuple[str, ...]:
 
 
 def _introduction(
-    rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally, full: int, rest: int
+    rule_set: RuleSet,
+    demonstrations: Demonstrations,
+    tally: Tally,
+    card: RuleSetCard,
+    full: int,
+    rest: int,
 ) -> tuple[str, ...]:
     if not rule_set.rules:
         return (
@@ -210,6 +218,12 @@ def _introduction(
         else "Several may apply; the first, in this order, decides. Where none applies, the agent "
         "acts as it likes."
     )
+    if only_one and tally.coverage == 1.0:
+        each = " of each action dimension" if len(rule_set.actions) > 1 else ""
+        applying = (
+            f"In every demonstrated state exactly one rule{each} applies, and it decides: whoever "
+            "is held to the rules has no choice of their own there."
+        )
     if rule_set.forbids:
         applying = (
             "A rule that forbids takes an action away and leaves the others to the agent. Several "
@@ -229,7 +243,7 @@ def _introduction(
             f"are shown in full, the other {rest:,} in a table after them."
         )
     if not tally.same:
-        sentences.append(origin_text(rule_set, demonstrations, tally))
+        sentences.append(origin_text(rule_set, demonstrations, tally, card))
     return tuple(sentences)
 
 

@@ -19,7 +19,7 @@ from sarl_core.explaining.report.outcomes import (
     outcomes_note,
     pairs_of,
 )
-from sarl_core.explaining.report.rule_set_card import ReportedEpisodes
+from sarl_core.explaining.report.rule_set_card import RuleSetCard
 from sarl_core.explaining.report.tally import Share, Tally
 from sarl_core.explaining.words.sign_off import SignOff
 from sarl_core.mining.language import counted, share_text
@@ -69,7 +69,7 @@ def summary_part(
     certified: CertificatesPart,
     gaps: UncoveredSummary,
     elsewhere: Sequence[str],
-    reported: ReportedEpisodes,
+    card: RuleSetCard,
     sign_off: SignOff | None,
 ) -> SummaryPart:
     """The first page of a report.
@@ -82,17 +82,18 @@ def summary_part(
         certified: What is certified.
         gaps: What the rules do not reach.
         elsewhere: How far they match the expert where they were not mined, in sentences.
-        reported: What the card of the rules says that they achieved.
+        card: Of the rules.
         sign_off: Who approved them; None where it is not known.
 
     Returns:
         The part of the report.
     """
     pairs = pairs_of(results)
-    decides = counts.leeway is None and counts.coverage == 1.0
+    decides = counts.decides
+    reported = card.reported_episodes
     return SummaryPart(
         lead=_AS_POLICY if decides else _AS_SHIELD,
-        demonstrated=demonstrated(rule_set, demonstrations, counts),
+        demonstrated=demonstrated(rule_set, demonstrations, counts, card),
         effects=tuple(effects(rule_set, pairs, results, reported, decides=decides)),
         outcomes=outcome_rows(pairs, results),
         outcomes_note=outcomes_note(results),
@@ -137,10 +138,11 @@ def _uncovered(counts: Tally, gaps: UncoveredSummary) -> Iterator[str]:
         )
     outside = [one for one in gaps.beyond if one.outside_share > 0]
     if outside:
-        steps = ", ".join(f"in {one.outside} of the steps of {one.player}" for one in outside)
+        steps = " and ".join(f"{one.outside} of the steps of {one.player}" for one in outside)
         yield (
-            f"Beyond what was demonstrated: {steps} some number of the state lay outside all "
-            "demonstrated ones, and the rules acted there all the same."
+            "Beyond what was demonstrated: in the few episodes played for the pictures, in "
+            f"{steps} some number of the state lay outside all demonstrated ones. The rules act "
+            "there all the same."
         )
     yield (
         "States that nobody demonstrated, another task or other sensors are not covered; nothing "

@@ -79,6 +79,11 @@ class Tally:
         return float((self.rules >= 0).mean())
 
     @property
+    def decides(self) -> bool:
+        """Whether the rules name an action in every state, so that nobody else has a choice."""
+        return self.leeway is None and self.coverage == 1.0
+
+    @property
     def followed(self) -> Share:
         """In how many of the covered states the expert did as the rules say."""
         whole = int((self.rules >= 0).sum())

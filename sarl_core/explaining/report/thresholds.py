@@ -11,7 +11,7 @@ import numpy as np
 
 from sarl_core.documents import fitting
 from sarl_core.explaining.colours import layer_colour
-from sarl_core.explaining.report.rule_set_card import ReportedEpisodes, RuleSetCard
+from sarl_core.explaining.report.rule_set_card import RuleSetCard
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.edit_counts import edits_sentence
 from sarl_core.mining.language import counted, number_text, share_text, threshold_text
@@ -291,12 +291,11 @@ def _built(rule_set: RuleSet, card: RuleSetCard) -> tuple[str, ...]:
         return _cut(rule_set)
     sentences = [
         "These rules were not cut out by thresholds. A tree of a few conditions was built so that "
-        "in every state exactly one rule for each action applies: few rules that do as much as "
-        "possible. So these rules leave an agent nothing to choose from: they are a policy that "
+        f"in every state exactly one rule{_of_each(rule_set)} applies: few rules that do as much "
+        "as possible. So these rules leave an agent nothing to choose from: they are a policy that "
         "replaces it, and no longer a shield that corrects it here and there.",
     ]
     if card.budget is not None:
-        each = " for each action" if len(rule_set.actions) > 1 else ""
         rounds_text = (
             f" In {counted(len(card.rounds), 'round')} the rules were let act, the expert was "
             "asked what it would have done in the states they led to, and the rules were built "
@@ -304,7 +303,7 @@ def _built(rule_set: RuleSet, card: RuleSetCard) -> tuple[str, ...]:
             if card.rounds
             else ""
         )
-        sentences.append(f"The budget was {card.budget:,} rules{each}.{rounds_text}")
+        sentences.append(f"The budget was {card.budget:,} rules{_of_each(rule_set)}.{rounds_text}")
         if card.refined:
             sentences.append(
                 "Then the thresholds in the rules were moved to where the rules achieve more "
@@ -318,11 +317,16 @@ def _built(rule_set: RuleSet, card: RuleSetCard) -> tuple[str, ...]:
     return tuple(sentences)
 
 
+def _of_each(rule_set: RuleSet) -> str:
+    """Of each what there is one rule, where there are several."""
+    return " of each action dimension" if len(rule_set.actions) > 1 else ""
+
+
 def _card_facts(card: RuleSetCard, *, forbids: bool) -> Iterator[tuple[str, str]]:
     """What a card says."""
     agent = "an agent under the rules" if forbids else "an agent that follows the rules"
     if card.budget is not None:
-        yield "Most rules for each action", number_text(card.budget)
+        yield "Most rules", number_text(card.budget)
     if card.rounds:
         choice = _with(", of which the rules of round {} were taken", card.chosen_round)
         rounds = "Rounds of probes" if forbids else "Rounds of asking the expert"
@@ -331,7 +335,7 @@ def _card_facts(card: RuleSetCard, *, forbids: bool) -> Iterator[tuple[str, str]
         yield "Thresholds moved to achieve more", "yes" if card.refined else "no"
     if card.chosen_by is not None:
         yield "Chosen by", card.chosen_by
-    reported = fitting(card.reported, ReportedEpisodes)
+    reported = card.reported_episodes
     if reported.mean is not None:
         yield (
             f"Mean return of {agent}",
@@ -350,7 +354,7 @@ def _card_facts(card: RuleSetCard, *, forbids: bool) -> Iterator[tuple[str, str]
         between = _with(" (95 % interval {} to {})", reported.cost_low, reported.cost_high)
         yield f"Cost of {agent}", cost + between
     if card.reported_on is not None:
-        yield "ReportedEpisodes on", card.reported_on
+        yield "Measured on", card.reported_on
     if card.seed is not None:
         yield "Seed", number_text(card.seed)
     if card.command is not None:
