@@ -162,7 +162,7 @@ def test_the_plane_holds_what_mining_gives(cart: Demonstrations, rules: RuleSet)
             mined = mine_rules(cart, supp_min=support / 100, conf_min=float(confidence) / 100)
             assert len(mined) == count
     (chosen,) = re.findall(r'class="chosen" aria-label="(.*?)"', plane)
-    assert chosen == f"{len(rules)}, in force"
+    assert chosen == f"{len(rules)}, chosen"
 
 
 def test_names_from_files_are_only_ever_text(cart: Demonstrations) -> None:

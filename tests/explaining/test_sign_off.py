@@ -121,10 +121,7 @@ def test_a_report_says_it_below_its_numbers(rules: RuleSet, cart: Demonstrations
     html = make_report(rules, cart, **quick, sign_off=sign_off_of([ADA])).html
     assert f'<p class="soft">{SENTENCE}</p>' in html
     assert "as long as nobody else approves the rules" in html
-    assert (
-        "Nobody has approved them yet."
-        in make_report(rules, cart, **quick, sign_off=SignOff()).html
-    )
+    assert "Nobody has yet." in make_report(rules, cart, **quick, sign_off=SignOff()).html
     hostile = make_report(rules, cart, **quick, sign_off=sign_off_of([HOSTILE])).html
     assert "<script>" not in hostile
     assert "&lt;script&gt;" in hostile

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from sarl_core.decimals import telling_text
 from sarl_core.explaining.report.certificates import CertificatesPart
 from sarl_core.explaining.report.comparison import HARMS, Result, is_known
-from sarl_core.explaining.report.gaps import UncoveredSummary
+from sarl_core.explaining.report.gaps import Doubt, UncoveredSummary
 from sarl_core.explaining.report.outcomes import (
     MOST_PAIRS,
     Pair,
@@ -19,6 +19,9 @@ from sarl_core.explaining.report.rule_set_card import ReportedEpisodes
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.explaining.words.sign_off import SignOff
 from sarl_core.mining.language import counted, listed, share_text
+
+_MOST_DOUBTS = 3
+_MOST_NAMES = 4
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ def decisions(
     """
     if not pairs:
         yield OpenQuestion(
-            "Are the rules to be measured before they are put in force?",
+            "Are the rules to be used without a measurement?",
             "What they do to whoever is held to them is not known.",
         )
     yield from (_of_pair(pair) for pair in pairs[:MOST_PAIRS])
@@ -73,7 +76,7 @@ def decisions(
         yield OpenQuestion(
             "Is it enough that the rules leave the other states alone?",
             f"In {share_text(1.0 - counts.coverage)} of the demonstrated states no rule applies: "
-            "there every action passes.",
+            f"there every action passes{_done_there(gaps)}.",
         )
     if gaps.unused:
         yield OpenQuestion(
@@ -81,14 +84,13 @@ def decisions(
             "Recorded, and the rules decide without.",
         )
     if gaps.doubts:
-        names = listed(gaps.doubts[0].names, most=4)
-        more = "" if len(gaps.doubts) == 1 else " And others (section 4)."
         yield OpenQuestion(
-            "Has somebody looked at the rules that deserve a second look?",
-            f"{gaps.doubts[0].text.removesuffix('.')} ({names}).{more}",
+            "Can the rules that deserve a second look stay as they are?",
+            " ".join(_named(doubt) for doubt in gaps.doubts[:_MOST_DOUBTS])
+            + (" And others (section 4)." if len(gaps.doubts) > _MOST_DOUBTS else ""),
         )
     if sign_off is not None and not sign_off.approvals:
-        yield OpenQuestion("Are the rules approved as they stand?", "Nobody has approved them yet.")
+        yield OpenQuestion("Do you approve the rules as they stand?", "Nobody has yet.")
 
 
 def _of_pair(pair: Pair) -> OpenQuestion:
@@ -105,6 +107,21 @@ def _of_pair(pair: Pair) -> OpenQuestion:
     effect = effects.get(one.effect, "What they change is not known")
     against = "" if alone is None else f", against {_numbers(alone)} without them"
     return OpenQuestion(question, f"{effect}: {_numbers(one)}{against}.")
+
+
+def _named(doubt: Doubt) -> str:
+    """A doubt and whose it is."""
+    return f"{doubt.text.removesuffix('.')} ({listed(doubt.names, most=_MOST_NAMES)})."
+
+
+def _done_there(gaps: UncoveredSummary) -> str:
+    """What the expert did most in the states without a rule, where that is a single action."""
+    shares = [one.uncovered for one in gaps.coverage if one.uncovered is not None]
+    if len(shares) != 1 or not shares[0].rows:
+        return ""
+    rows = sorted(shares[0].rows, key=lambda row: row.part, reverse=True)[:2]
+    most = " and ".join(f"{row.name} ({row.share})" for row in rows if row.part)
+    return f". There the expert mostly did {most}"
 
 
 def _numbers(one: Result) -> str:

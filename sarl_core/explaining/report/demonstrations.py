@@ -34,12 +34,14 @@ class ActionRow:
         colour: As everywhere.
         share: As "21 %".
         bar: SVG.
+        part: The share, 0 to 1.
     """
 
     name: str
     colour: str
     share: str
     bar: Markup
+    part: float
 
 
 @dataclass(frozen=True)
@@ -171,7 +173,9 @@ def action_shares(counts: np.ndarray, dimension: LabelledDimension) -> ActionSha
         return ActionShares(
             dimension.name,
             rows=tuple(
-                ActionRow(name, label_colour(label), share_text(share), share_bar(share, colour))
+                ActionRow(
+                    name, label_colour(label), share_text(share), share_bar(share, colour), share
+                )
                 for label, (name, share) in enumerate(zip(names, shares, strict=True))
                 for colour in [label_colour(label)]
             ),

@@ -228,11 +228,29 @@ def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> 
             needed = least_share(own[0][1], rule_set) if own else None
             if needed is None:
                 continue
+            below = [index for index, rule in own if verdict(rule, needed) == "below"]
+            aside = "in the episodes kept aside, each counted once"
             doubt(
-                [index for index, rule in own if verdict(rule, needed) == "below"],
-                f"does not reach {share_text(needed)} in the episodes kept aside.",
-                f"do not reach {share_text(needed)} in the episodes kept aside.",
+                below,
+                f"does not reach {share_text(needed)} {aside}{_reached(rule_set, below)}.",
+                f"do not reach {share_text(needed)} {aside}.",
             )
+        untried = [index for index, rule in rules if (one := rule.held_out) and not one.samples]
+        doubt(
+            untried,
+            "came up in no episode kept aside: it was never tried.",
+            "came up in no episode kept aside: they were never tried.",
+        )
+        scarce = [
+            index
+            for index, rule in rules
+            if (one := rule.held_out) and one.samples and 0 < one.episodes < FEWEST_EPISODES
+        ]
+        doubt(
+            scarce,
+            f"came up in fewer than {FEWEST_EPISODES} episodes kept aside: too few to tell.",
+            f"came up in fewer than {FEWEST_EPISODES} episodes kept aside: too few to tell.",
+        )
     else:
         minority = [index for index, rule in rules if 2 * rule.correct < rule.samples]
         doubt(
@@ -243,6 +261,14 @@ def _doubts(rule_set: RuleSet, demonstrations: Demonstrations, tally: Tally) -> 
     off = [index for index, rule in enumerate(rule_set.rules) if not rule.enabled]
     doubt(off, "is switched off and does nothing.", "are switched off and do nothing.")
     return tuple(doubts)
+
+
+def _reached(rule_set: RuleSet, below: Sequence[int]) -> str:
+    """What the only rule reaches that was to reach more."""
+    held_out = rule_set.rules[below[0]].held_out if len(below) == 1 else None
+    if held_out is None or held_out.share is None:
+        return ""
+    return f", but {share_text(held_out.share)}"
 
 
 def _beyond(

@@ -102,7 +102,7 @@ def summary_part(
             *certified.verdicts,
             *_match(rule_set, demonstrations, counts, elsewhere),
         ),
-        uncovered=tuple(_uncovered(counts, gaps)),
+        uncovered=tuple(_uncovered(counts, gaps, demonstrations)),
         decisions=tuple(
             decisions(
                 pairs, reported, certified=certified, gaps=gaps, counts=counts, sign_off=sign_off
@@ -126,11 +126,14 @@ def _match(
         yield (
             "How far the rules match the expert, not what they achieve: in the "
             f"{aside} kept aside it did what they say in {tried.part:,} of "
-            f"{counted(tried.whole, 'state')} with a rule ({share_text(tried.value)})."
+            f"{counted(tried.whole, 'state')} with a rule ({share_text(tried.value)}; there long "
+            "episodes count more than short ones)."
         )
 
 
-def _uncovered(counts: Tally, gaps: UncoveredSummary) -> Iterator[str]:
+def _uncovered(
+    counts: Tally, gaps: UncoveredSummary, demonstrations: Demonstrations
+) -> Iterator[str]:
     if counts.coverage < 1.0:
         yield (
             f"In {share_text(1.0 - counts.coverage)} of the demonstrated states no rule applies: "
@@ -148,6 +151,16 @@ def _uncovered(counts: Tally, gaps: UncoveredSummary) -> Iterator[str]:
         "States that nobody demonstrated, another task or other sensors are not covered; nothing "
         "here proves that following the rules avoids harm."
     )
+    unsaid = [
+        what
+        for what, known in (
+            ("in which environment or on which machine they were recorded", demonstrations.env_id),
+            ("who the expert was", demonstrations.agent),
+        )
+        if not known
+    ]
+    if unsaid:
+        yield f"The demonstrations do not say {' and '.join(unsaid)}."
     if gaps.unused:
         yield f"No rule looks at {gaps.unused}."
     if counts.leeway is not None:

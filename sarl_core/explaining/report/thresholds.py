@@ -22,6 +22,7 @@ from sarl_core.mining.tree import PolicyTree
 from sarl_core.rollouts.failures import rate_text
 
 # Fine where the rules change fast: at small supports and high confidences.
+_CHOSEN = "as chosen"
 _SUPPORTS = (0.0, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 _CONFIDENCES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
 
@@ -129,12 +130,13 @@ def thresholds_part(
     same = (
         ""
         if tally.same
-        else " It counts the demonstrations of this report, which are not those the rules were "
-        "mined from."
+        else " All of this counts every demonstration of this report. The rules were made from "
+        "others, or from a part of them, so that their own numbers differ a little from those of "
+        "the framed cell."
     )
     text = (
         "Each cell holds the number of rules that its pair of thresholds gives; darker is more. "
-        f"The framed cell is the pair in force.{same}"
+        f"The framed cell is the pair that was chosen.{same}"
     )
     if edits:
         text += " It counts the rules as they were mined, before the changes by hand."
@@ -154,8 +156,8 @@ def _cut(rule_set: RuleSet) -> tuple[str, ...]:
         "Rules come from a decision tree: conditions on the state, tried one after the other. "
         "Each way through the tree ends at the first point that is good enough to be a rule.",
         f"A rule was kept if it applies to at least {share_text(limits.support)} of the "
-        f"demonstrated states ({counted(max(least, 1), 'state')} of {steps:,}; this share is its "
-        "support), and if the expert did what the rule says in at least "
+        f"states that the rules were made from ({counted(max(least, 1), 'state')} of {steps:,}; "
+        "this share is its support), and if the expert did what the rule says in at least "
         f"{share_text(limits.confidence)} of those (its confidence).",
     ]
     if limits.lift > 0:
@@ -255,7 +257,7 @@ def _least(trees: Sequence[PolicyTree]) -> float:
 
 def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighbour, ...]:
     support, confidence = limits.support, limits.confidence
-    pairs: dict[str, tuple[float, float]] = {"in force": (support, confidence)}
+    pairs: dict[str, tuple[float, float]] = {_CHOSEN: (support, confidence)}
     if support > 0:
         pairs["half the support"] = (support / 2, confidence)
         pairs["twice the support"] = (min(2 * support, 1.0), confidence)
@@ -278,7 +280,7 @@ def _neighbours(trees: Sequence[PolicyTree], limits: Thresholds) -> tuple[Neighb
             length=f"{float(at.mean_length[0, 0]):.1f}",
             covered=share_text(float(at.coverage[0, 0])),
             followed=share_text(float(at.fidelity[0, 0])),
-            chosen=name == "in force",
+            chosen=name == _CHOSEN,
         )
     return tuple(neighbours.values())
 
