@@ -42,6 +42,7 @@ ROWS = {
     "import": "startup.imports",
     "visitors": "visitors.sliders",
     "uploads": "visitors.uploads",
+    "memory": "memory.whole_way",
     "cold-start": "browser.cold_start",
     "intervals": "evidence.intervals",
 }

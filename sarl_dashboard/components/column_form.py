@@ -55,7 +55,7 @@ class TableFile(Protocol):
     def name(self) -> str:
         """Of the file."""
 
-    def getvalue(self) -> bytes:
+    def getvalue(self) -> bytes | memoryview:
         """Its content."""
 
 

@@ -94,3 +94,14 @@ def test_what_a_reader_did_not_foresee_is_one_sentence(monkeypatch: pytest.Monke
     monkeypatch.setattr(view, "read_files", broken)
     app = finished(upload(open_page("demonstrations"), ("mine.csv", csv_bytes(*ROWS))))
     assert "does not know why (ZeroDivisionError)" in errors(app)[0]
+
+
+def test_the_session_holds_no_content_of_a_file_whose_name_stands_there() -> None:
+    app = finished(upload(open_page("demonstrations"), ("mine.csv", csv_bytes(*ROWS))))
+    (stored,) = app.session_state["_stored_files"].values()
+    assert bytes(stored.getvalue()) == csv_bytes(*ROWS)
+    assert all(not getattr(one, "getvalue", bytes)() for one in app.session_state["upload_files"])
+    # And what Streamlit then takes for another file is not read another time.
+    job = app.session_state["_job_reading"]
+    app.run()
+    assert app.session_state["_job_reading"] is job

@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import streamlit as st
-from streamlit.runtime.uploaded_file_manager import UploadedFile
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import ColumnRole, read_files
@@ -30,6 +29,7 @@ from sarl_dashboard.state.data import set_upload, steps_of, uncombined_demonstra
 from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import refuse
+from sarl_dashboard.views.demonstrations.stored_files import StoredFile, stored_files
 
 _LEFT_OUT = "--missing drop"  # what an error says where steps that lack a value can be left out
 _LOGGER = logging.getLogger(__name__)
@@ -39,9 +39,9 @@ _BYTES_A_SECOND = 30_000_000  # of text, which takes longest
 _MOST = 0.95  # of a bar that only knows how long such work usually takes
 
 
-def uploaded_files() -> list[UploadedFile]:
+def uploaded_files() -> Sequence[StoredFile]:
     """The files in the uploader."""
-    return list(st.session_state.get("upload_files") or [])
+    return stored_files("upload_files")
 
 
 def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
@@ -64,7 +64,7 @@ def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
             PLACE.begin(_job_of(_request()))
             return
         with st.spinner("Reading and checking …"):
-            upload = _read(*_request())
+            upload = _read(_request())
     except SarlError as error:
         st.session_state["_upload_error"] = str(error)
         return
@@ -73,16 +73,17 @@ def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
 
 def _take(upload: Demonstrations | MinedData) -> None:
     """Keep what was read, and choose it."""
+    release()  # what reading has left, before writing needs room
     with st.spinner("Keeping it in the library …"):
         set_upload(upload, file_name=", ".join(file.name for file in uploaded_files()))
-    release()  # what reading has left
+    release()
     st.toast(f"Read {steps_of(upload).whole.steps:,} steps.", icon=":material/check:")
 
 
 class _Request(NamedTuple):
     """What is to be read, and how."""
 
-    files: Sequence[tuple[memoryview, str]]
+    files: Sequence[StoredFile]
     columns: Mapping[str, ColumnRole] | None
     env_id: Environment | None
     missing: Missing
@@ -91,23 +92,20 @@ class _Request(NamedTuple):
 def _request() -> _Request:
     """What the uploader holds, with what is said of it."""
     return _Request(
-        # A buffer of its own would be a copy.
-        [(memoryview(file.getvalue()), file.name) for file in uploaded_files()],
+        uploaded_files(),
         st.session_state["_upload_columns"],
         environment(),
         "drop" if st.session_state.get("upload_missing") else "refuse",
     )
 
 
-def _read(
-    files: Sequence[tuple[memoryview, str]],
-    columns: Mapping[str, ColumnRole] | None,
-    env_id: Environment | None,
-    missing: Missing,
-) -> Demonstrations | MinedData:
+def _read(request: _Request) -> Demonstrations | MinedData:
+    files = [(file.getvalue(), file.name) for file in request.files]
     try:
         if not any(is_mined_file(name) for _, name in files):
-            return read_files(files, env_id=env_id, columns=columns, missing=missing)
+            return read_files(
+                files, env_id=request.env_id, columns=request.columns, missing=request.missing
+            )
         (content, name), *others = files
         if others:
             raise InputError(
@@ -128,7 +126,7 @@ def _read(
 def _job_of(request: _Request) -> Callable[[], Job[Demonstrations | MinedData]]:
     """What begins to read large files beside the page."""
     key = _uploaded()
-    size = sum(len(content) for content, _ in request.files)
+    size = sum(file.size for file in request.files)
 
     def work(job: Job[Demonstrations | MinedData]) -> None:
         begun = time.monotonic()
@@ -143,7 +141,7 @@ def _job_of(request: _Request) -> Callable[[], Job[Demonstrations | MinedData]]:
         # it off need not wait for its end.
         executor = ThreadPoolExecutor(1)
         try:
-            (job.result,) = run_each(_read, [request], executor=executor, progress=progress)
+            (job.result,) = run_each(_read, [(request,)], executor=executor, progress=progress)
         finally:
             executor.shutdown(wait=False)
 
@@ -216,6 +214,10 @@ def _read_mapped() -> None:
 
 def read_new_upload() -> None:
     """Read what was uploaded just now; open the form where the columns are not clear."""
+    # Streamlit calls a file whose content it no longer has another one, and says so once.
+    if (uploaded := _uploaded()) and uploaded == st.session_state.get("_upload_ids"):
+        return
+    st.session_state["_upload_ids"] = uploaded
     st.session_state["_upload_mapped"] = False
     read_upload()
     if not PLACE.at_work:
