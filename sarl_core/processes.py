@@ -75,6 +75,8 @@ class Processes(Executor):
                 initargs=(os.getpid(), self._gives_way),
                 env={"OMP_NUM_THREADS": str(self._threads)},
                 job_reducers={np.ndarray: handed_over},
+                # A process may let go of a result, and of its file, before that is read here.
+                result_reducers={},
             )
             return self._submitted(call, *arguments, **named)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import time
 from pathlib import Path
 
 import numpy as np
@@ -49,5 +50,24 @@ def test_a_process_sees_the_same_numbers() -> None:
     processes = Processes(1)
     try:
         assert processes.submit(np.sum, fixed()).result() == pytest.approx(fixed().sum())
+    finally:
+        processes.shutdown()
+
+
+class SlowToRead:
+    """What whoever reads it waits for."""
+
+    def __reduce__(self) -> tuple[object, tuple[float]]:
+        return time.sleep, (0.5,)
+
+
+def slow_result() -> tuple[object, np.ndarray]:
+    return SlowToRead(), fixed()
+
+
+def test_what_a_process_gives_back_is_there_when_it_has_let_go_of_it() -> None:
+    processes = Processes(1)
+    try:
+        assert np.array_equal(processes.submit(slow_result).result()[1], fixed())
     finally:
         processes.shutdown()
