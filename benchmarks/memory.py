@@ -93,8 +93,8 @@ def whole_way(quick: bool) -> Iterable[Row]:
             ("upload", partial(_upload, page, file)),
             ("tree and Thresholds", partial(_open, page, "Thresholds", "stMetricValue")),
         ]
-        for title in () if quick else ("Rules", "Evidence", "Export", "Report", "Episodes"):
-            steps.append((title, partial(_open, page, title, "stHeading")))
+        titles = () if quick else ("Rules", "Evidence", "Export", "Report", "Episodes")
+        steps += [(title, partial(_open, page, title, "stHeading")) for title in titles]
         for what, step in steps:
             with watched(server) as peak:
                 step()

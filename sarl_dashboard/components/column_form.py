@@ -59,6 +59,27 @@ class TableFile(Protocol):
         """Its content."""
 
 
+def previews_of(files: Sequence[TableFile], said: Roles | None = None) -> tuple[ColumnPreview, ...]:
+    """What the columns of uploaded files hold and seem to be.
+
+    Args:
+        files: One or more, or none.
+        said: What was said of their columns before.
+
+    Returns:
+        () where there is no table, or none that can be opened: whoever reads it says why.
+    """
+    if not files:
+        return ()
+    contents: list[tuple[Content, str]] = [
+        (memoryview(file.getvalue()), file.name) for file in files
+    ]
+    try:
+        return preview_columns(contents, columns=said)
+    except Exception:
+        return ()
+
+
 @dataclass(frozen=True, eq=False)
 class ColumnForm:
     """The form of one uploader.
@@ -76,7 +97,11 @@ class ColumnForm:
 
     @classmethod
     def of_files(
-        cls, key: str, files: Sequence[TableFile], said: Roles | None = None
+        cls,
+        key: str,
+        files: Sequence[TableFile],
+        said: Roles | None = None,
+        previews: Sequence[ColumnPreview] | None = None,
     ) -> ColumnForm:
         """The form for files that were uploaded, filled in with what their columns seem to be.
 
@@ -84,6 +109,7 @@ class ColumnForm:
             key: What the keys of its widgets begin with.
             files: One or more, or none.
             said: What was said of their columns before.
+            previews: Of these columns, where somebody has looked at them already.
 
         Returns:
             The form.
@@ -92,16 +118,9 @@ class ColumnForm:
         opened: tuple[tuple[str, ...], ColumnForm] | None = st.session_state.get(f"_{key}_form")
         if opened is not None and opened[0] == uploaded:
             return opened[1]
-        previews: tuple[ColumnPreview, ...] = ()
-        if files:
-            try:
-                contents: list[tuple[Content, str]] = [
-                    (memoryview(file.getvalue()), file.name) for file in files
-                ]
-                with st.spinner("Looking at the columns …"):
-                    previews = preview_columns(contents, columns=said)
-            except Exception:  # whoever reads the files says why
-                previews = ()
+        if previews is None:
+            with st.spinner("Looking at the columns …"):
+                previews = previews_of(files, said)
         form = cls(key, previews)
         st.session_state[f"_{key}_form"] = uploaded, form
         form._fill_in()

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.formats import ColumnRole, read_files
+from sarl_core.demonstrations.formats import ColumnPreview, ColumnRole, read_files
 from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.environments.environment import Environment
@@ -20,7 +20,7 @@ from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.distributed.mined_files import is_mined_file, read_mined_data
 from sarl_core.processes import run_each
 from sarl_dashboard.cache import release
-from sarl_dashboard.components.column_form import ColumnForm
+from sarl_dashboard.components.column_form import ColumnForm, previews_of
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Job, Place
@@ -32,6 +32,7 @@ from sarl_dashboard.text import refuse
 from sarl_dashboard.views.demonstrations.stored_files import StoredFile, stored_files
 
 _LEFT_OUT = "--missing drop"  # what an error says where steps that lack a value can be left out
+_Looked = dict[tuple[str, ...], Sequence[ColumnPreview]]  # by the ids of the files
 _LOGGER = logging.getLogger(__name__)
 PLACE = Place[Demonstrations | MinedData]("reading")
 _AT_ONCE = 20_000_000  # bytes that are read while one waits
@@ -127,6 +128,8 @@ def _job_of(request: _Request) -> Callable[[], Job[Demonstrations | MinedData]]:
     """What begins to read large files beside the page."""
     key = _uploaded()
     size = sum(file.size for file in request.files)
+    # The columns are looked at first: beside demonstrations that are read they need too much room.
+    looked: _Looked = st.session_state.setdefault("_upload_previews", {})
 
     def work(job: Job[Demonstrations | MinedData]) -> None:
         begun = time.monotonic()
@@ -141,6 +144,12 @@ def _job_of(request: _Request) -> Callable[[], Job[Demonstrations | MinedData]]:
         # it off need not wait for its end.
         executor = ThreadPoolExecutor(1)
         try:
+            if key not in looked:
+                looked.clear()
+                (looked[key],) = run_each(
+                    previews_of, [(request.files,)], executor=executor, progress=progress
+                )
+                release()
             (job.result,) = run_each(_read, [(request,)], executor=executor, progress=progress)
         finally:
             executor.shutdown(wait=False)
@@ -197,7 +206,8 @@ def environment() -> Environment | None:
 
 
 def _form() -> ColumnForm:
-    return ColumnForm.of_files("map", uploaded_files())
+    looked: _Looked = st.session_state.get("_upload_previews", {})
+    return ColumnForm.of_files("map", uploaded_files(), previews=looked.get(_uploaded()))
 
 
 def _read_mapped() -> None:
