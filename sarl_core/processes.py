@@ -23,6 +23,8 @@ _IDLE_SECONDS = 300  # after which a process that nobody needs ends
 _LOOK_SECONDS = 0.5  # between two looks at whether the caller still wants it
 _PARENT_SECONDS = 2.0  # between two looks at whether the process that asked is still there
 _LOST = "a process ended unexpectedly, as when memory runs out; run again"
+# GNU's C library gives large arrays back at once where it does not choose by itself which they are.
+_ALLOCATION = {"MALLOC_MMAP_THRESHOLD_": str(2**20)}
 _NICENESS = 5  # whoever serves pages goes first, and the work goes on all the same
 
 Key = TypeVar("Key", bound=Hashable)
@@ -73,7 +75,7 @@ class Processes(Executor):
                 timeout=_IDLE_SECONDS,
                 initializer=_begin,
                 initargs=(os.getpid(), self._gives_way),
-                env={"OMP_NUM_THREADS": str(self._threads)},
+                env={"OMP_NUM_THREADS": str(self._threads), **_ALLOCATION},
                 job_reducers={np.ndarray: handed_over},
                 # A process may let go of a result, and of its file, before that is read here.
                 result_reducers={},

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import ctypes
 import functools
 import gc
 import inspect
 import os
-import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Mapping
@@ -24,6 +22,7 @@ from streamlit.runtime.scriptrunner import get_script_run_ctx
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.environments.formulas import Formula
+from sarl_core.memory import release
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.rule_set import RuleSet
@@ -225,15 +224,6 @@ def _collect() -> None:
     gc.collect()
     gc.freeze()
     release()
-
-
-def release() -> None:
-    """Give what is free to the system: what allocators keep looks like use to whoever watches."""
-    import pyarrow
-
-    pyarrow.default_memory_pool().release_unused()
-    if sys.platform == "linux":  # and there GNU's C library has it
-        getattr(ctypes.CDLL(None), "malloc_trim", int)(0)
 
 
 @st.cache_resource(scope="session", on_release=_end, show_spinner=False)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import time
+from functools import partial
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.memory import release
 from sarl_core.mining.growing.growth import EXACT_UP_TO, grow_policy_trees
 from sarl_core.mining.tree import Learner
 from sarl_core.processes import Processes, run_each
@@ -43,6 +45,9 @@ def is_done(demonstrations: Demonstrations, divider: int) -> bool:
 def job_of(demonstrations: Demonstrations, divider: int) -> Job[Trees]:
     """Begin to grow them."""
     arguments = growing_of(demonstrations, divider)
+    states, divider, learner = arguments
+    # Nothing of the dashboard, which a process would have to load for it.
+    grow = partial(grow_policy_trees, divider=divider, learner=learner)
     keep = trees_under_any_name.keeping(*arguments)
     steps = len(demonstrations)
     values = demonstrations.observations.size * demonstrations.action_columns.shape[1]
@@ -63,23 +68,10 @@ def job_of(demonstrations: Demonstrations, divider: int) -> Job[Trees]:
         # Its own process, since growing a tree can be ended in no other way.
         executor = Processes(1, threads=os.cpu_count() or 1)
         try:
-            (trees,) = run_each(grown, [arguments], executor=executor, progress=progress)
+            (trees,) = run_each(grow, [(states,)], executor=executor, progress=progress)
         finally:
             executor.shutdown(wait=False, cancel_futures=True)
+        release()  # they came in one piece, which is as large as they are
         keep(trees)
 
     return Job(key_of(demonstrations, divider), work, 1)
-
-
-def grown(demonstrations: Demonstrations, divider: int, learner: Learner) -> Trees:
-    """As `grow_policy_trees`, for a process.
-
-    Args:
-        demonstrations: N pairs.
-        divider: Number of intervals of continuous dimensions.
-        learner: What grows them.
-
-    Returns:
-        One tree an action dimension.
-    """
-    return grow_policy_trees(demonstrations, divider=divider, learner=learner)

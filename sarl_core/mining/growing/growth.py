@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError, quoted, require
+from sarl_core.memory import release
 from sarl_core.mining.growing.exact import exact_structure
 from sarl_core.mining.growing.histogram import BinnedStates, histogram_structure
 from sarl_core.mining.growing.structure import TreeStructure, count_tree, tree_levels
@@ -100,10 +101,17 @@ def grow_policy_trees(
     if chosen == "histogram":
         bins = BinnedStates.of(states)
         structures = [
-            histogram_structure(bins, column, least=least, max_depth=max_depth, seed=seed)
-            for column in labels
+            histogram_structure(
+                bins,
+                column,
+                least=least,
+                max_depth=max_depth,
+                seed=seed,
+                last=index == len(labels) - 1,
+            )
+            for index, column in enumerate(labels)
         ]
-        del bins  # half as large as the states are, and counting needs room, too
+        release()  # what small nodes have left: counting needs room, too
         return tuple(
             replace(
                 count_tree(
@@ -149,7 +157,9 @@ def part_of_tree(
         Its queries.
     """
     if learner == "histogram" and len(labels) > EXACT_UP_TO:
-        return histogram_structure(BinnedStates.of(observations), labels, max_depth=max_depth)[0]
+        return histogram_structure(
+            BinnedStates.of(observations), labels, max_depth=max_depth, last=True
+        )[0]
     return exact_structure(observations, labels, max_depth=max_depth)
 
 

@@ -33,12 +33,12 @@ _MANY_NODES = 8
 _AT_ONCE = 30_000  # states whose features are counted in one go: of more, a feature fills the cache
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class BinnedStates:
     """States as numbers of bins, which serve the trees of all action dimensions.
 
     Attributes:
-        numbers: The bin of each value, (d, N) uint16.
+        numbers: The bin of each value, (d, N) uint16; those of no state once they were taken.
         borders: For each feature what lies between two bins, ascending, float64: a value is in
             bin 0 where it is at most the first.
     """
@@ -75,6 +75,11 @@ class BinnedStates:
         with ThreadPoolExecutor(cpu_count()) as threads:  # sorting and searching let others run
             borders = tuple(threads.map(bin_feature, range(observations.shape[1])))
         return cls(numbers, borders)
+
+    def taken(self) -> NDArray[np.uint16]:
+        """The numbers, which are here no longer: a tree that grows needs their room."""
+        numbers, self.numbers = self.numbers, self.numbers[:, :0].copy()
+        return numbers
 
 
 class Query(NamedTuple):
@@ -128,6 +133,7 @@ def histogram_structure(
     least: int = 2,
     max_depth: int | None = None,
     seed: int = 0,
+    last: bool = False,
 ) -> tuple[TreeStructure, NDArray[np.int64]]:
     """Grow a tree of which each query asks about a border between two bins.
 
@@ -138,13 +144,20 @@ def histogram_structure(
         max_depth: Of the tree; None grows it fully: a leaf is pure, or no border between bins
             parts its states.
         seed: For choosing among equally good queries of few states.
+        last: Whether the bins serve no other tree, so that their numbers may be taken.
 
     Returns:
         Its queries, each left part before the right one; and the leaf of each state, (N,).
     """
     counts = [len(borders) + 1 for borders in bins.borders]
+    # Handed over without a name, so that whoever is given them alone holds them.
     structure, leaves = binned_structure(
-        bins.numbers, counts, labels, least=least, max_depth=max_depth, seed=seed
+        bins.taken() if last else bins.numbers,
+        counts,
+        labels,
+        least=least,
+        max_depth=max_depth,
+        seed=seed,
     )
     threshold = np.zeros(len(structure.feature))
     for index, borders in enumerate(bins.borders):
@@ -180,7 +193,9 @@ def binned_structure(
     # scikit-learn, which sorts, lets other threads run.
     with ThreadPoolExecutor(cpu_count()) as threads:
         growth = _Growth(threads, max(2, least), max_depth, seed)
-        return growth.grow(numbers, counts, labels)
+        waiting = growth.root(numbers, counts, labels)
+        del numbers
+        return growth.grow(waiting, len(labels))
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +212,7 @@ class _Part:
 
     node: int
     depth: int
-    rows: NDArray[np.int64]
+    rows: NDArray[np.signedinteger]
     keys: NDArray[np.unsignedinteger]
     counts: NDArray[np.int64] | None = None
 
@@ -220,23 +235,27 @@ class _Growth:
     left: array[int] = field(default_factory=lambda: array("q", [LEAF]))
     right: array[int] = field(default_factory=lambda: array("q", [LEAF]))
 
-    def grow(
+    def root(
         self, numbers: NDArray[np.uint16], counts: Sequence[int], labels: NDArray[np.int64]
-    ) -> tuple[TreeStructure, NDArray[np.int64]]:
-        """Grow it over states, (d, N), with so many bins, d, and these labels, (N,)."""
-        present, labels = np.unique(labels, return_inverse=True)
+    ) -> list[_Part]:
+        """What to begin with: states, (d, N), with so many bins, d, and these labels, (N,)."""
+        present = np.unique(labels)
         self.labels = len(present)
         # Bins of a feature with few values lie far apart, so that they stay apart when others are
         # taken together.
         self.spread = np.log2(BINS // np.array(counts)).astype(np.uint16)
         kind = np.uint16 if self.labels * BINS <= 2**16 else np.uint32
         keys = np.left_shift(numbers, self.spread[:, None], dtype=kind)
-        keys += (labels * BINS).astype(kind)
-        leaves = np.zeros(len(labels), dtype=np.int64)
-        waiting = [_Part(0, 0, np.arange(len(labels)), keys)] if len(labels) else []
-        del keys
+        keys += np.multiply(np.searchsorted(present, labels), BINS, dtype=kind, casting="unsafe")
+        # One number a state is held of each, and there are fewer nodes than twice the states.
+        place = np.int32 if 2 * len(labels) < 2**31 else np.int64
+        return [_Part(0, 0, np.arange(len(labels), dtype=place), keys)] if len(labels) else []
+
+    def grow(self, waiting: list[_Part], n: int) -> tuple[TreeStructure, NDArray[np.int64]]:
+        """Grow it over n states; of the parts that wait nobody else should hold any."""
+        leaves = np.zeros(n, dtype=waiting[0].rows.dtype if waiting else np.int64)
         sorted_parts: list[
-            tuple[int, NDArray[np.int64], Future[tuple[TreeStructure, NDArray[np.int64]]]]
+            tuple[int, NDArray[np.signedinteger], Future[tuple[TreeStructure, NDArray[np.int64]]]]
         ] = []
         while waiting:
             part = waiting.pop()
@@ -330,10 +349,10 @@ class _Growth:
     def _take(
         self,
         node: int,
-        rows: NDArray[np.int64],
+        rows: NDArray[np.signedinteger],
         below: TreeStructure,
         reached: NDArray[np.int64],
-        leaves: NDArray[np.int64],
+        leaves: NDArray[np.signedinteger],
     ) -> None:
         """Put a part that was sorted where its node is."""
         n = len(below.feature)
@@ -354,7 +373,9 @@ class _Growth:
         self.border[node] = float(below.threshold[0])
         self.border.extend(below.threshold[1:].tolist())
 
-    def _in_order(self, leaves: NDArray[np.int64]) -> tuple[TreeStructure, NDArray[np.int64]]:
+    def _in_order(
+        self, leaves: NDArray[np.signedinteger]
+    ) -> tuple[TreeStructure, NDArray[np.int64]]:
         """Nodes with the numbers of one who goes down the left side first."""
         left, right = np.array(self.left), np.array(self.right)
         levels = tree_levels(left, right)

@@ -16,10 +16,10 @@ from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError
+from sarl_core.memory import release
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.distributed.mined_files import is_mined_file, read_mined_data
 from sarl_core.processes import run_each
-from sarl_dashboard.cache import release
 from sarl_dashboard.components.column_form import ColumnForm, previews_of
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
