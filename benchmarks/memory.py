@@ -26,6 +26,7 @@ from sarl_core import save_demonstrations
 ROWS = 1_000_000
 DATA = ROWS * (FEATURES * 4 + 3 * 8)  # bytes: states, and an action, an episode and a step each
 REACH = 3.0
+THRESHOLDS = "support=0.001&confidence=0.8"  # a few rules, of an expert that is often undecided
 _PERIOD = 0.05  # seconds between two looks
 _QUIET = 10.0  # seconds without a change
 _SAME = 2_000_000  # bytes
@@ -86,15 +87,17 @@ def whole_way(quick: bool) -> Iterable[Row]:
         save_demonstrations(pairs(ROWS, seed=0), file)
         server = _server_in(folder)
         for path in ("thresholds", "demonstrations"):
-            page.goto(f"{address}/{path}")
+            page.goto(f"{address}/{path}?{THRESHOLDS}")
             settle(page)
         idle = _settled(server)
         steps: list[tuple[str, Callable[[], None]]] = [
             ("upload", partial(_upload, page, file)),
             ("tree and Thresholds", partial(_open, page, "Thresholds", "stMetricValue")),
         ]
-        titles = () if quick else ("Rules", "Evidence", "Export", "Report", "Episodes")
+        titles = () if quick else ("Rules", "Evidence", "Export", "Episodes", "Report")
         steps += [(title, partial(_open, page, title, "stHeading")) for title in titles]
+        if not quick:
+            steps.append(("the report is made", partial(_report, page)))
         for what, step in steps:
             with watched(server) as peak:
                 step()
@@ -135,6 +138,11 @@ def _open(page: Page, title: str, sign: str) -> None:
     page.get_by_role("heading", name=title).first.wait_for()
     page.get_by_test_id(sign).first.wait_for()
     page.get_by_role("button", name="Cancel").wait_for(state="detached")
+
+
+def _report(page: Page) -> None:
+    page.get_by_role("button", name="Make the report").click()
+    page.get_by_role("button", name="Download the report").wait_for()
 
 
 def _server_in(folder: Path) -> psutil.Process:

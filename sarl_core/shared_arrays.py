@@ -36,6 +36,32 @@ def handed_over(array: NDArray[Any]) -> Any:
     return array.__reduce_ex__(pickle.HIGHEST_PROTOCOL)
 
 
+def shared(array: NDArray[Any]) -> NDArray[Any]:
+    """The same numbers where other processes find them, and in their memory and here only once.
+
+    Args:
+        array: Any.
+
+    Returns:
+        Of a large one that nobody can change, what stands in its file; else the array itself.
+    """
+    if not (array.nbytes >= _LEAST and _is_fixed(array) and not array.dtype.hasobject):
+        return array
+    try:
+        path = _written(array)
+    except OSError:  # no room for a file
+        return array
+    opened = _opened(path)
+    with _LOCK:
+        _remember(opened, path)
+    return opened
+
+
+def is_shared(array: NDArray[Any]) -> bool:
+    """Whether an array is what `shared` gave: nobody can change it, though it owns no memory."""
+    return id(array) in _FILES and array.base is not None
+
+
 def _is_fixed(array: Any) -> bool:
     """Whether nobody can change an array, nor what it is a view of."""
     while isinstance(array, np.ndarray):
@@ -48,19 +74,28 @@ def _is_fixed(array: Any) -> bool:
 def _file_of(array: NDArray[Any]) -> Path:
     with _LOCK:
         if id(array) not in _FILES or not _FILES[id(array)].exists():
-            known = id(array) in _FILES
-            handle, name = tempfile.mkstemp(suffix=".npy")
-            path = Path(name)
-            try:
-                with os.fdopen(handle, "wb") as file:
-                    np.save(file, array, allow_pickle=False)
-            except OSError:
-                path.unlink()
-                raise
-            _FILES[id(array)] = path
-            if not known:
-                weakref.finalize(array, _remove, id(array))
+            _remember(array, _written(array))
         return _FILES[id(array)]
+
+
+def _written(array: NDArray[Any]) -> Path:
+    """A new file of an array."""
+    handle, name = tempfile.mkstemp(suffix=".npy")
+    path = Path(name)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            np.save(file, array, allow_pickle=False)
+    except OSError:
+        path.unlink()
+        raise
+    return path
+
+
+def _remember(array: NDArray[Any], path: Path) -> None:
+    """Know where an array stands, for as long as it is there."""
+    if id(array) not in _FILES:
+        weakref.finalize(array, _remove, id(array))
+    _FILES[id(array)] = path
 
 
 def _remove(identity: int) -> None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import gc
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sarl_core import shared_arrays
+from sarl_core import Demonstrations, shared_arrays
+from sarl_core.demonstrations.shared import in_shared_memory
 from sarl_core.processes import Processes
-from sarl_core.shared_arrays import handed_over
+from sarl_core.shared_arrays import handed_over, shared
 
 
 def fixed() -> np.ndarray:
@@ -54,6 +56,20 @@ def test_a_process_sees_the_same_numbers() -> None:
         processes.shutdown()
 
 
+def test_what_is_shared_stands_in_the_file_that_processes_are_given() -> None:
+    array = shared(fixed())
+    assert np.array_equal(array, fixed())
+    assert not array.flags.writeable
+    again, (path,) = handed_over(array)
+    assert Path(path).exists()
+    assert np.array_equal(again(path), array)
+    del array
+    gc.collect()
+    assert not Path(path).exists()
+    small = np.zeros(3)
+    assert shared(small) is small
+
+
 class SlowToRead:
     """What whoever reads it waits for."""
 
@@ -71,3 +87,14 @@ def test_what_a_process_gives_back_is_there_when_it_has_let_go_of_it() -> None:
         assert np.array_equal(processes.submit(slow_result).result()[1], fixed())
     finally:
         processes.shutdown()
+
+
+def test_demonstrations_are_the_same_in_shared_memory_and_are_not_copied_again() -> None:
+    states = np.random.default_rng(0).normal(size=(2**17, 8)).astype(np.float32)
+    before = Demonstrations(states, np.arange(2**17) % 2, np.zeros(2**17, dtype=np.int64))
+    after = in_shared_memory(before)
+    assert after.observations is not before.observations
+    assert Demonstrations(states, before.actions, before.episodes).digest == after.digest
+    renamed = replace(after, feature_names=tuple("abcdefgh"))
+    assert renamed.observations is after.observations
+    assert handed_over(renamed.observations)[1] == handed_over(after.observations)[1]

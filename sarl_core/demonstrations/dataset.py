@@ -381,7 +381,7 @@ class Demonstrations(DemonstrationFields):
     @property
     def raw_observations(self) -> NDArray[np.float32]:
         """The features that were observed alone, (N, d)."""
-        return self.observations[:, : len(self.observed)]
+        return self.observations[:, : len(self.observed)] if self.derived else self.observations
 
     @cached_property
     def action_dimensions(self) -> tuple[ActionDimension, ...]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.splits import written_value
 from sarl_core.errors import InputError
+from sarl_core.shared_arrays import is_shared
 
 FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of them
 
@@ -333,7 +334,7 @@ def as_numbers(given: Any, what: str) -> NDArray[Any]:
 
 def frozen(array: NDArray[Any], dtype: Any) -> NDArray[Any]:
     """The array itself if nobody can change it, else a copy."""
-    untouchable = array.base is None and not array.flags.writeable
+    untouchable = (array.base is None or is_shared(array)) and not array.flags.writeable
     if untouchable and array.dtype == dtype and array.flags.c_contiguous:
         return array
     with np.errstate(over="ignore", invalid="ignore"):  # found as infinite

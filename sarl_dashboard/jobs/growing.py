@@ -58,10 +58,10 @@ def job_of(demonstrations: Demonstrations, divider: int) -> Job[Trees]:
 
         def progress(done: int, total: int) -> bool:
             seconds = time.monotonic() - begun
-            job.text = (
-                f"Growing the decision tree of {steps:,} states: {seconds:.0f} s of about "
-                f"{expected:.0f} s"
-            )
+            usual = f"of about {expected:.0f} s"
+            if seconds > expected:  # where the expert is often undecided, the tree is large
+                usual = f"so far, usually it takes {expected:.0f} s"
+            job.text = f"Growing the decision tree of {steps:,} states: {seconds:.0f} s {usual}"
             job.done = min(seconds / expected, _MOST)
             return job.wanted()
 

@@ -73,7 +73,8 @@ def reporting(order: ReportOrder) -> Job[Report]:
 
 
 def _make(job: Job[Report], order: ReportOrder, cache: BoundedCache[Report]) -> None:
-    job.text = "Playing episodes and drawing them …" if order.wishes.frames else "Writing …"
+    plays = order.wishes.frames and (order.wishes.env_id or order.demonstrations.env_id)
+    job.text = "Playing episodes and drawing them …" if plays else "Writing …"
 
     def progress(done: int, total: int) -> bool:
         if done == total:

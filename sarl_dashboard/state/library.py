@@ -15,6 +15,7 @@ import streamlit as st
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import ColumnRole
+from sarl_core.demonstrations.shared import in_shared_memory
 from sarl_core.errors import InputError, SarlError, quoted
 from sarl_core.library import Item, Library
 from sarl_core.library.contents import (
@@ -130,7 +131,8 @@ def stored_demonstrations(identifier: str) -> Demonstrations | MinedData:
 @cached(show_spinner="Reading the demonstrations …")
 def _read(identifier: str, digest: str) -> Demonstrations | MinedData:
     opened = library()
-    return data_of(opened, opened.item(identifier))
+    stored = data_of(opened, opened.item(identifier))
+    return stored if isinstance(stored, MinedData) else in_shared_memory(stored)
 
 
 def _steps_digest(data: Demonstrations | MinedData) -> str:

@@ -14,6 +14,7 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import ColumnPreview, ColumnRole, read_files
 from sarl_core.demonstrations.formats.missing import Missing
 from sarl_core.demonstrations.formats.naming import naming
+from sarl_core.demonstrations.shared import in_shared_memory
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError
 from sarl_core.memory import release
@@ -104,8 +105,11 @@ def _read(request: _Request) -> Demonstrations | MinedData:
     files = [(file.getvalue(), file.name) for file in request.files]
     try:
         if not any(is_mined_file(name) for _, name in files):
-            return read_files(
-                files, env_id=request.env_id, columns=request.columns, missing=request.missing
+            # At once, so that nobody holds them twice.
+            return in_shared_memory(
+                read_files(
+                    files, env_id=request.env_id, columns=request.columns, missing=request.missing
+                )
             )
         (content, name), *others = files
         if others:
