@@ -11,6 +11,7 @@ is one. What is between two bins is a threshold of the states, so the tree asks 
 from __future__ import annotations
 
 from array import array
+from collections import deque
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -30,6 +31,7 @@ _FEWEST_BINS = 32
 _STATES_A_BIN = 4  # of a node, at least, before neighbouring bins are taken together
 _SORTED = 500  # states that are sorted rather than counted, where many nodes are to come of them
 _MANY_NODES = 8
+_WAITING = 64  # parts at most that are sorted, or wait for it, or to be taken
 _AT_ONCE = 30_000  # states whose features are counted in one go: of more, a feature fills the cache
 
 
@@ -254,9 +256,14 @@ class _Growth:
     def grow(self, waiting: list[_Part], n: int) -> tuple[TreeStructure, NDArray[np.int64]]:
         """Grow it over n states; of the parts that wait nobody else should hold any."""
         leaves = np.zeros(n, dtype=waiting[0].rows.dtype if waiting else np.int64)
-        sorted_parts: list[
+        sorted_parts: deque[
             tuple[int, NDArray[np.signedinteger], Future[tuple[TreeStructure, NDArray[np.int64]]]]
-        ] = []
+        ] = deque()
+
+        def take() -> None:
+            node, rows, future = sorted_parts.popleft()
+            self._take(node, rows, *future.result(), leaves)
+
         while waiting:
             part = waiting.pop()
             leaves[part.rows] = part.node
@@ -265,10 +272,12 @@ class _Growth:
             if self.least * _MANY_NODES <= len(part.rows) <= _SORTED:
                 future = self.threads.submit(self._sorted, replace(part, counts=None))
                 sorted_parts.append((part.node, part.rows, future))
+                if len(sorted_parts) > _WAITING:
+                    take()
             else:
                 waiting += self._split(part)
-        for node, rows, future in sorted_parts:
-            self._take(node, rows, *future.result(), leaves)
+        while sorted_parts:
+            take()
         return self._in_order(leaves)
 
     def _is_split(self, part: _Part) -> bool:
