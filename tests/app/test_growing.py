@@ -22,7 +22,7 @@ def many(monkeypatch: pytest.MonkeyPatch) -> None:
     RESULTS.clear()
 
 
-def slow(*_: object) -> None:
+def slow(*_: object, **__: object) -> None:
     time.sleep(WAIT)
 
 
@@ -47,7 +47,7 @@ def test_a_page_waits_for_the_tree_and_goes_on_by_itself() -> None:
 
 
 def test_it_says_how_long_it_takes_and_can_be_called_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(growing, "grown", slow)
+    monkeypatch.setattr(growing, "grow_policy_trees", slow)
     app = open_page("rules", data="cartpole")
     assert app.title[0].value == "Rules"
     assert not app.dataframe
@@ -74,12 +74,12 @@ def test_it_says_how_long_it_takes_and_can_be_called_off(monkeypatch: pytest.Mon
     assert not app.exception
 
 
-def failing(*_: object) -> None:
+def failing(*_: object, **__: object) -> None:
     raise WorkError("the memory is full; close something")
 
 
 def test_what_went_wrong_is_said_with_a_way_to_try_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(growing, "grown", failing)
+    monkeypatch.setattr(growing, "grow_policy_trees", failing)
     app = open_page("rules", data="cartpole")
     until = time.monotonic() + WAIT
     while work_of(app).running and time.monotonic() < until:

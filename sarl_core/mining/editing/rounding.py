@@ -93,7 +93,7 @@ def rounded_rules(rule_set: RuleSet, demonstrations: Demonstrations) -> Rounding
         InputError: If the demonstrations have another number of features than the rules.
     """
     rule_set = rules_for(rule_set, demonstrations).rule_set
-    columns = np.ascontiguousarray(demonstrations.observations.T)
+    columns = demonstrations.observations.T
     able = _can_apply(rule_set.rules)
     whole: frozenset[int] = frozenset()
     while True:
