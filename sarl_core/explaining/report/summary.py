@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.explaining.figures.distributions import feature_rows
 from sarl_core.explaining.report.certificates import CertificatesPart
 from sarl_core.explaining.report.comparison import Result
 from sarl_core.explaining.report.decisions import OpenQuestion, decisions
+from sarl_core.explaining.report.demonstrations import within
 from sarl_core.explaining.report.gaps import UncoveredSummary
 from sarl_core.explaining.report.origin import demonstrated
 from sarl_core.explaining.report.outcomes import (
@@ -22,13 +25,19 @@ from sarl_core.explaining.report.outcomes import (
 from sarl_core.explaining.report.rule_set_card import RuleSetCard
 from sarl_core.explaining.report.tally import Share, Tally
 from sarl_core.explaining.words.sign_off import SignOff
-from sarl_core.mining.language import counted, share_text
+from sarl_core.mining.language import counted, listed, share_text
 from sarl_core.mining.rule_set import RuleSet
 
 _AS_SHIELD = (
-    "An agent is a program that chooses actions. Used as a shield, rules stand between it and its "
-    "task: an action that breaks a rule is replaced before it is carried out."
+    "An agent is a program that chooses actions. Used as a shield, rules stand between it and "
+    "its task: an action that breaks a rule is replaced by what the rule says, before it is carried "
+    "out."
 )
+_AS_FORBIDDING = (
+    "An agent is a program that chooses actions. Used as a shield, rules stand between it and its "
+    "task: an action that they forbid is replaced before it is carried out."
+)
+_MOST_RANGES = 4
 _AS_POLICY = (
     "These rules name an action in every state that was demonstrated. Whoever is held to them has "
     "nothing left to choose: there the rules decide, in place of a person or a program."
@@ -92,7 +101,7 @@ def summary_part(
     decides = counts.decides
     reported = card.reported_episodes
     return SummaryPart(
-        lead=_AS_POLICY if decides else _AS_SHIELD,
+        lead=_AS_POLICY if decides else _AS_FORBIDDING if rule_set.forbids else _AS_SHIELD,
         demonstrated=demonstrated(rule_set, demonstrations, counts, card),
         effects=tuple(effects(rule_set, pairs, results, reported, decides=decides)),
         outcomes=outcome_rows(pairs, results),
@@ -102,7 +111,7 @@ def summary_part(
             *certified.verdicts,
             *_match(rule_set, demonstrations, counts, elsewhere),
         ),
-        uncovered=tuple(_uncovered(counts, gaps, demonstrations)),
+        uncovered=tuple(_uncovered(counts, gaps, rule_set, demonstrations)),
         decisions=tuple(
             decisions(
                 pairs, reported, certified=certified, gaps=gaps, counts=counts, sign_off=sign_off
@@ -132,13 +141,15 @@ def _match(
 
 
 def _uncovered(
-    counts: Tally, gaps: UncoveredSummary, demonstrations: Demonstrations
+    counts: Tally, gaps: UncoveredSummary, rule_set: RuleSet, demonstrations: Demonstrations
 ) -> Iterator[str]:
     if counts.coverage < 1.0:
         yield (
             f"In {share_text(1.0 - counts.coverage)} of the demonstrated states no rule applies: "
             "there every action passes."
         )
+    if ranges := _ranges(rule_set, demonstrations):
+        yield f"Demonstrated: {ranges}. Beyond that most rules speak all the same."
     outside = [one for one in gaps.beyond if one.outside_share > 0]
     if outside:
         steps = " and ".join(f"{one.outside} of the steps of {one.player}" for one in outside)
@@ -168,3 +179,23 @@ def _uncovered(
             "What the expert was not shown to do is not unsafe for that, and what no rule forbids "
             "is not safe for that."
         )
+
+
+def _ranges(rule_set: RuleSet, demonstrations: Demonstrations) -> str:
+    """From where to where the numbers went that most rules ask about, where they are observed."""
+    features = demonstrations.features
+    uses = Counter(
+        bounds.feature
+        for rule in rule_set.rules
+        for bounds in (rule.bounds if rule.enabled else ())
+        if features[bounds.feature].derived is None and features[bounds.feature].indicator is None
+    )
+    most = [index for index, _ in uses.most_common(_MOST_RANGES)]
+    rows = feature_rows(demonstrations) if most else ()
+    texts = [
+        f"{rows[index].name} {within(rows[index].low, rows[index])} to "
+        f"{within(rows[index].high, rows[index])}"
+        f"{f' {features[index].unit}' if features[index].unit else ''}"
+        for index in sorted(most)
+    ]
+    return listed(texts, most=_MOST_RANGES)

@@ -22,7 +22,7 @@ from sarl_core.mining.tree import PolicyTree
 from sarl_core.rollouts.failures import rate_text
 
 # Fine where the rules change fast: at small supports and high confidences.
-_CHOSEN = "as chosen"
+_CHOSEN = "these thresholds"
 _SUPPORTS = (0.0, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 _CONFIDENCES = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
 
@@ -130,9 +130,9 @@ def thresholds_part(
     same = (
         ""
         if tally.same
-        else " All of this counts every demonstration of this report. The rules were made from "
-        "others, or from a part of them, so that their own numbers differ a little from those of "
-        "the framed cell."
+        else " All of this counts every demonstration of this report. The rules of this report "
+        "were made from others, or from a part of them: the same thresholds make other rules here, "
+        "whose numbers are not theirs."
     )
     text = (
         "Each cell holds the number of rules that its pair of thresholds gives; darker is more. "
