@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Literal
 
 import streamlit as st
 
@@ -12,6 +15,7 @@ from sarl_core.explaining.words.markdown import markdown_text
 from sarl_core.mining.language import counted
 
 escaped = markdown_text
+LabelVisibility = Literal["visible", "collapsed"]
 # What sentences say to those who type commands: the forms on the pages do the same.
 _OPTIONS = re.compile(r"with --column .* \(on the page \w+: in the form\)")
 _IN_BRACKETS = re.compile(r" \((--missing drop, in Python [^)]*|--column [^)]*=[a-z]+)\)")
@@ -45,6 +49,30 @@ def _with_code(text: str) -> str:
 def refuse(problem: Exception | str) -> None:
     """Say what is wrong, in its one sentence."""
     st.error(in_full(str(problem)), icon=":material/error:")
+
+
+@contextmanager
+def labelled(
+    name: str, width: int | Literal["stretch", "content"] = "stretch"
+) -> Iterator[LabelVisibility]:
+    """Label a widget by a name that may hold signs of Markdown.
+
+    A label is read aloud as it was written, escapes and all. So where a name needs them it stands
+    above its widget, whose label is the name itself and is not seen.
+
+    Args:
+        name: What the widget within is labelled by, as it is.
+        width: Of the widget.
+
+    Yields:
+        Whether the widget's own label is seen.
+    """
+    if escaped(name) == name:
+        yield "visible"
+        return
+    with st.container(gap=None, width=width):
+        st.markdown(f":small[{escaped(name)}]")
+        yield "collapsed"
 
 
 def together(text: str) -> str:

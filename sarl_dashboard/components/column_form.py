@@ -23,7 +23,7 @@ from sarl_core.demonstrations.formats.registry import Content
 from sarl_core.environments.feature_order import plain_names
 from sarl_core.errors import InputError, quoted
 from sarl_core.explaining.html.column_previews import NAMELESS, column_previews_html
-from sarl_dashboard.text import escaped
+from sarl_dashboard.text import escaped, labelled
 
 _SINGLE: dict[RoleName, str] = {
     "episode": "Episode: which run a row is of",
@@ -410,23 +410,29 @@ class ColumnForm:
             if one.kind_as_action is None:
                 continue
             with st.container(horizontal=True, vertical_alignment="bottom"):
-                st.segmented_control(
-                    f"{escaped(_name(one.name))} is",
-                    list(_KINDS),
-                    format_func=_KINDS.__getitem__,
-                    key=f"{self.key}_kind {one.name}",
-                    required=True,
-                )
+                question = f"{_name(one.name)} is"
+                with labelled(question, width="content") as label_visibility:
+                    st.segmented_control(
+                        question,
+                        list(_KINDS),
+                        format_func=_KINDS.__getitem__,
+                        key=f"{self.key}_kind {one.name}",
+                        required=True,
+                        label_visibility=label_visibility,
+                    )
                 if self._get(f"kind {one.name}") == "continuous":
                     for end, label in (("low", "Least possible"), ("high", "Greatest possible")):
-                        st.number_input(
-                            f"{label} {escaped(_name(one.name))}",
-                            value=None,
-                            key=f"{self.key}_{end} {one.name}",
-                            placeholder="as demonstrated",
-                            format="%g",
-                            width=220,
-                        )
+                        name = f"{label} {_name(one.name)}"
+                        with labelled(name, width=220) as label_visibility:
+                            st.number_input(
+                                name,
+                                value=None,
+                                key=f"{self.key}_{end} {one.name}",
+                                placeholder="as demonstrated",
+                                format="%g",
+                                width=220,
+                                label_visibility=label_visibility,
+                            )
 
     def _ask_names(self, matched: Sequence[str]) -> None:
         """Ask which column each name of the rules is of that no column bears."""
@@ -443,16 +449,18 @@ class ColumnForm:
         ]
         with st.grid("auto", min_column_width=190):
             for field, (role, name) in self._named().items():
-                st.selectbox(
-                    escaped(name),
-                    free if role == "feature" else actions,
-                    key=f"{self.key}_{field}",
-                    format_func=_name,
-                    placeholder="Choose a column",
-                    index=None,
-                    on_change=self._claim,
-                    args=(field,),
-                )
+                with labelled(name) as label_visibility:
+                    st.selectbox(
+                        name,
+                        free if role == "feature" else actions,
+                        key=f"{self.key}_{field}",
+                        format_func=_name,
+                        placeholder="Choose a column",
+                        index=None,
+                        on_change=self._claim,
+                        args=(field,),
+                        label_visibility=label_visibility,
+                    )
 
     def _ask_units(self) -> None:
         features = self._get("observations")
@@ -460,12 +468,14 @@ class ColumnForm:
             return
         with st.expander("Units (optional)"), st.grid("auto", min_column_width=150):
             for name in features:
-                st.text_input(
-                    escaped(_name(name)),
-                    key=f"{self.key}_unit {name}",
-                    placeholder="as m/s",
-                    max_chars=24,
-                )
+                with labelled(_name(name)) as label_visibility:
+                    st.text_input(
+                        _name(name),
+                        key=f"{self.key}_unit {name}",
+                        placeholder="as m/s",
+                        max_chars=24,
+                        label_visibility=label_visibility,
+                    )
 
 
 def _name(column: str) -> str:

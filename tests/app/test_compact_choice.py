@@ -156,7 +156,7 @@ def test_one_action_of_several_is_looked_at_alone(compact: RuleSet) -> None:
     app = open_page("thresholds", data="bipedal_walker", set="compact")
     every = int(metrics(app)["Rules"])
     name = WALKER.action_dimensions[1].name
-    app.button_group(key="dimension").set_value(name).run()
+    app.selectbox(key="dimension").set_value(name).run()
     assert 0 < int(metrics(app)["Rules"]) <= 6 < every
     assert len(app.dataframe[0].value) == int(metrics(app)["Rules"])
     app.slider(key="divider").set_value(3).run()

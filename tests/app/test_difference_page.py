@@ -96,7 +96,7 @@ def test_five_sets_are_held_against_each_other_and_two_are_looked_at_closely() -
     assert against[0]["filtered"] == ""  # itself
     assert against[-1]["filtered"] == "0 %"
     assert "Filtered says" in " ".join(app.dataframe[0].value)
-    app.button_group(key="against").set_value("compact").run()
+    app.selectbox(key="against").set_value("compact").run()
     assert "Compact says" in " ".join(app.dataframe[0].value)
 
 
@@ -127,9 +127,9 @@ def test_a_link_to_rules_that_are_not_there_says_so(name: str) -> None:
 
 def test_one_action_of_several_at_a_time() -> None:
     app = open_page("difference", data="bipedal_walker", sets="filtered|unfiltered")
-    names = app.button_group(key="decided").options
+    names = app.selectbox(key="decided").options
     assert len(names) == 4
-    app.button_group(key="decided").set_value(names[1]).run()
+    app.selectbox(key="decided").set_value(names[1]).run()
     assert not app.exception
     assert "action" not in app.query_params
 

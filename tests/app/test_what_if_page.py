@@ -183,3 +183,16 @@ def test_compact_rules_abstain_where_the_shield_does() -> None:
     words = said(app)
     assert "Outside this rule's data" in words
     assert "is executed, as the agent wants" in words
+
+
+def test_a_name_with_signs_of_markdown_is_read_aloud_as_it_is() -> None:
+    def page() -> None:
+        from sarl_core.shielding.sampling import Span
+        from sarl_dashboard.views.what_if.slider import span_slider
+
+        for name in ("speed (m/s)", "own_speed*2"):
+            span_slider(name, Span(0.0, 1.0, 2.0), name)
+
+    app = AppTest.from_function(page).run()
+    assert [slider.label for slider in app.slider] == ["speed (m/s)", "own_speed*2"]
+    assert [one.value for one in app.markdown] == [r":small[own\_speed\*2]"]

@@ -144,6 +144,7 @@ def test_markdown_escapes_names(lander_trees: tuple[PolicyTree, ...]) -> None:
     assert columns == {6}
     assert "<img" not in text
     assert not re.search(r"(?<!\\)`", text)
-    # As the label of a slider it is read aloud as it is written.
+    assert not re.search(":material/[a-z]+:", markdown_text(":material/home: x"))  # no icon
+    # And what needs no escape has none.
     for plain in ("plain words 2.5 m/s", "pole angle (rad)"):
         assert markdown_text(plain) == plain

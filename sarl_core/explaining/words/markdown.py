@@ -9,7 +9,7 @@ _SIGNS = re.compile(r"([\\`*_{}\[\]#~|$:!^@+-])")
 _ORDINARY = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ,;.+/²³°%-]*")
 # What becomes a link or an emoji after the escapes are gone: a character without width breaks it.
 _JOINER = "\u2060"
-_BREAKS = re.compile(r"(?<=:)(?=//|[\w+-]+:)|(?<=@)|(?<=www)(?=\.)", re.IGNORECASE)
+_BREAKS = re.compile(r"(?<=:)(?=//|[\w+/-]+:)|(?<=@)|(?<=www)(?=\.)", re.IGNORECASE)
 
 
 def markdown_text(text: str) -> str:

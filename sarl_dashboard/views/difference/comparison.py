@@ -27,7 +27,7 @@ from sarl_dashboard.components.settings import notes_notice, switch
 from sarl_dashboard.components.tables import action_column, row_height, table_height
 from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_files import fitting_demonstrations
-from sarl_dashboard.text import escaped, refuse, together
+from sarl_dashboard.text import escaped, labelled, refuse, together
 from sarl_dashboard.views.difference.overview import show_overview
 from sarl_dashboard.views.difference.sides import Side, chosen_sides
 
@@ -93,14 +93,16 @@ def _pair(sides: list[Side]) -> tuple[Side, Side]:
     name = next(iter(others))
     if len(others) > 1:
         st.header("Closely")
-        name = st.segmented_control(
-            f"{sides[0].name} against",
-            list(others),
-            default=name,
-            key="against",
-            bind="query-params",
-            required=True,
-        )
+        label = f"{sides[0].name} against"
+        with labelled(label, width=340) as label_visibility:
+            name = st.selectbox(
+                label,
+                list(others),
+                key="against",
+                bind="query-params",
+                width=340,
+                label_visibility=label_visibility,
+            )
     return sides[0], others.get(name, sides[1])
 
 
@@ -249,10 +251,10 @@ def _show_states(compared: RuleSetComparison) -> None:
     if len(actions) > 1:
         labels = [action.name for action in actions]
         most = labels[int(disagreements.differs.sum(axis=0).argmax())]
-        name = st.segmented_control(
-            "Action", labels, default=most, key="decided", bind="query-params", required=True
+        name = st.selectbox(
+            "Action", labels, labels.index(most), key="decided", bind="query-params", width=340
         )
-        dimension = labels.index(name) if name in labels else 0
+        dimension = labels.index(name)
     table, examples = _decisions(compared, dimension)
     with st.container(key="confusion"):
         st.html(table)

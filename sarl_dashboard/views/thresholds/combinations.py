@@ -9,7 +9,7 @@ from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.state import combining, rule_base
 from sarl_dashboard.state.combining import CombinationChoice
 from sarl_dashboard.state.data import data_parts, uncombined_parts
-from sarl_dashboard.text import escaped, in_full
+from sarl_dashboard.text import in_full
 
 _FEATURES = "_combined_features"
 
@@ -47,7 +47,7 @@ def combinations_choice() -> None:
                 "Features to combine",
                 possible,
                 key=_FEATURES,
-                format_func=lambda index: escaped(names[index]),
+                format_func=names.__getitem__,
                 placeholder="all that are numbers",
                 on_change=_choose_features,
             )

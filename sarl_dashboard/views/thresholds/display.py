@@ -263,5 +263,13 @@ def chosen_dimension(names: list[str]) -> int | None:
     """Which of the action dimensions is looked at; None for all together."""
     if len(names) == 1:
         return None
-    name = switch("Action", "dimension", [WHOLE, *names])
+    # Not a switch, which takes its options for Markdown.
+    name = st.selectbox(
+        "Action",
+        [WHOLE, *names],
+        key="dimension",
+        bind="query-params",
+        width=200,
+        label_visibility="collapsed",
+    )
     return names.index(name) if name in names else None

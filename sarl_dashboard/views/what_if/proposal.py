@@ -10,6 +10,7 @@ import streamlit as st
 from sarl_core.mining.action_words import label_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.shielding.sampling import Span
+from sarl_dashboard.text import labelled
 from sarl_dashboard.views.what_if.slider import span_slider
 
 
@@ -26,7 +27,14 @@ def proposal(actions: tuple[LabelledDimension, ...]) -> Any:
             values.append(span_slider(title, Span(low, (low + high) / 2, high), f"a{index}"))
             continue
         names = [label_text(label, dimension) for label in range(dimension.n_labels)]
-        chosen = st.selectbox(title, names, key=f"a{index}", bind="query-params")
+        with labelled(title) as label_visibility:
+            chosen = st.selectbox(
+                title,
+                names,
+                key=f"a{index}",
+                bind="query-params",
+                label_visibility=label_visibility,
+            )
         values.append(dimension.actions[names.index(chosen)])
     if actions[0].is_interval:
         return np.array(values, dtype=np.float32)

@@ -6,6 +6,7 @@ import streamlit as st
 
 from sarl_core.decimals import digits_telling
 from sarl_core.shielding.sampling import Span
+from sarl_dashboard.text import labelled
 
 STEPS = 400
 
@@ -14,15 +15,17 @@ def span_slider(name: str, span: Span, key: str) -> float:
     """A slider with as many digits as its steps need."""
     step = (span.high - span.low) / STEPS
     digits = digits_telling(step, max(abs(span.low), abs(span.high)))
-    return float(
-        st.slider(
-            name,
-            span.low,
-            span.high,
-            span.middle,
-            step=step,
-            key=key,
-            bind="query-params",
-            format=f"%.{digits}g",
+    with labelled(name) as label_visibility:
+        return float(
+            st.slider(
+                name,
+                span.low,
+                span.high,
+                span.middle,
+                step=step,
+                key=key,
+                bind="query-params",
+                format=f"%.{digits}g",
+                label_visibility=label_visibility,
+            )
         )
-    )

@@ -12,7 +12,7 @@ from sarl_core.demonstrations.words import Coded, indicated, spelled, words_of
 from sarl_core.shielding.sampling import Span, random_state, within
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.jobs.replays import latest
-from sarl_dashboard.text import escaped
+from sarl_dashboard.text import labelled
 from sarl_dashboard.views.what_if.situation import Situation
 from sarl_dashboard.views.what_if.slider import span_slider
 
@@ -160,7 +160,7 @@ def draw(state: NDArray[np.float32], situation: Situation, index: int) -> None:
     """Ask for one feature of the state, or for the word of a column that several are about."""
     feature = situation.demonstrations.features[index]
     if feature.indicator is None:
-        name = escaped(f"{feature.name} ({feature.unit})" if feature.unit else feature.name)
+        name = f"{feature.name} ({feature.unit})" if feature.unit else feature.name
         state[index] = span_slider(name, situation.spans[index], f"x{index}")
         return
     column = feature.indicator.column
@@ -169,9 +169,15 @@ def draw(state: NDArray[np.float32], situation: Situation, index: int) -> None:
     words = words_of(indicators)
     middle = np.array([[situation.spans[at].middle for at in places]], dtype=np.float32)
     likeliest = int(spelled(middle, indicators).codes[0])
-    word = st.selectbox(
-        escaped(column), words, index=likeliest, key=f"x{index}", bind="query-params"
-    )
+    with labelled(column) as label_visibility:
+        word = st.selectbox(
+            column,
+            words,
+            index=likeliest,
+            key=f"x{index}",
+            bind="query-params",
+            label_visibility=label_visibility,
+        )
     state[places] = indicated(Coded(np.array([words.index(word)]), words), indicators)[0]
 
 
