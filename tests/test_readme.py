@@ -49,7 +49,7 @@ def test_the_shell_example(checkout):
     documents = [line for line in printed.splitlines() if line.startswith('{"episodes"')]
     assert len(json.loads(documents[0])["episodes"]) == 50
     assert len(RuleSet.load(checkout / "rules.json")) > 0
-    assert "<html>" in (checkout / "landscape.html").read_text(encoding="utf-8")
+    assert "</html>" in (checkout / "landscape.html").read_text(encoding="utf-8")
     assert (checkout / "replay.gif").read_bytes()[:6] == b"GIF89a"
 
 

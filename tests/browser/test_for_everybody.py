@@ -110,8 +110,10 @@ def documents(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder = tmp_path_factory.mktemp("documents")
     demonstrations = load_demonstrations(DATA / "cartpole.parquet")
     rules = mine_rules(demonstrations, supp_min=0.005, conf_min=0.95)
+    report = make_report(rules, demonstrations, frames=1)
     written = {
-        "report.html": make_report(rules, demonstrations, frames=1).html,
+        "report.html": report.html,
+        "slides.html": report.slides,
         "matrix.html": matrix_document(rule_matrix(rules)),
         "audit.html": audit_html(audit(rules, demonstrations), title="Cart Pole"),
     }

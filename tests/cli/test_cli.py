@@ -353,7 +353,8 @@ def test_landscape_html_opens_without_a_network(run, tmp_path):
     path = tmp_path / "landscape.html"
     run("landscape", CART, "--out", path)
     text = path.read_text(encoding="utf-8")
-    assert "<html>" in text
+    assert '<html lang="en">' in text
+    assert "<title>CartPole-v1: " in text
     assert '<script src="http' not in text
     assert "Coverage" in text
 

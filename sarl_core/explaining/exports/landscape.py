@@ -79,14 +79,21 @@ def save_landscape(
     elif suffix == ".csv":
         content = _csv(landscape, names).encode()
     elif suffix in (".html", ".png"):
+        from markupsafe import Markup
+
         from sarl_core.explaining.figures.png import figure_to_png
         from sarl_core.explaining.figures.thresholds import landscape_figure
+        from sarl_core.explaining.templates import render
 
         figure = landscape_figure(landscape, title=title)
         content = (
             figure_to_png(figure)
             if suffix == ".png"
-            else (figure.to_html(include_plotlyjs=True).encode())
+            else render(
+                "documents/figure",
+                title=title or "Rules at every pair of thresholds",
+                figure=Markup(figure.to_html(full_html=False, include_plotlyjs=True)),
+            ).encode()
         )
     else:
         raise InputError(f"{path} ends in none of .json, .csv, .html, .png; choose one")
