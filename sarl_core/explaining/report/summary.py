@@ -30,8 +30,8 @@ from sarl_core.mining.rule_set import RuleSet
 
 _AS_SHIELD = (
     "An agent is a program that chooses actions. Used as a shield, rules stand between it and "
-    "its task: an action that breaks a rule is replaced by what the rule says, before it is carried "
-    "out."
+    "its task: an action that breaks a rule is replaced by what the rule says, before it is "
+    "carried out."
 )
 _AS_FORBIDDING = (
     "An agent is a program that chooses actions. Used as a shield, rules stand between it and its "
