@@ -146,6 +146,10 @@ def _show(remaining: Demonstrations, rule_set: RuleSet, contradictions: Contradi
             args=(chosen,),
             help="Tick episodes in the table. Every page follows, and nothing is deleted.",
         )
+        st.caption(
+            "Click the boxes at the left of rows, or go to a row by the arrow keys and press Shift "
+            "and Space; Tab at the end of a row leaves the table."
+        )
     for place, action in enumerate(actions):
         if dimension in (None, place) and contradictions.near[:, place].any():
             st.markdown(f"**The nearest pairs: {escaped(action.name)}**")

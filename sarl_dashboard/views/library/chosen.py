@@ -61,7 +61,7 @@ def show_chosen(opened: Library, item: Item, author: str) -> None:
             f"{item.created.astimezone():%d %B %Y, %H:%M}"
         )
         if item.command:
-            st.code(item.command, language="sh")
+            st.code(item.command, language="sh", wrap_lines=True)
         for approval in item.approvals:
             st.markdown(f":material/verified: {escaped(approval_text(approval))}")
         show_content(opened, item)

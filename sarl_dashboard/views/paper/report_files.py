@@ -56,7 +56,7 @@ def require_report() -> PaperReport:
     except SarlError as error:
         refuse(error)
         st.caption("This makes it again:")
-        st.code(COMMAND, language="sh")
+        st.code(COMMAND, language="sh", wrap_lines=True)
         end_page()
     if reproduced is None or not reproduced.studies:
         st.info(
@@ -64,7 +64,7 @@ def require_report() -> PaperReport:
             f"figure; it takes about {FULL_MINUTES} minutes on two cores.",
             icon=":material/terminal:",
         )
-        st.code(COMMAND, language="sh")
+        st.code(COMMAND, language="sh", wrap_lines=True)
         end_page()
     return reproduced
 

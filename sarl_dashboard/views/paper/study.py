@@ -31,7 +31,8 @@ def show_study(name: str, entry: Entry | None) -> None:
             f"{study.place} has not been made yet. This command makes it:",
             icon=":material/terminal:",
         )
-        st.code(f"python -m sarl_core reproduce --figure {name} --out data/paper", language="sh")
+        command = f"python -m sarl_core reproduce --figure {name} --out data/paper"
+        st.code(command, language="sh", wrap_lines=True)
         return
     st.caption(study.about)
     if entry.quick:
@@ -95,5 +96,5 @@ def how_made(entry: Entry) -> None:
         st.markdown(
             f"On {entry.made}, within {max(1, round(entry.seconds / 60))} min, with {versions}."
         )
-        st.code(entry.command.replace("DIR", "data/paper"), language="sh")
+        st.code(entry.command.replace("DIR", "data/paper"), language="sh", wrap_lines=True)
         st.json({"settings": entry.settings, "inputs": entry.inputs}, expanded=2)
