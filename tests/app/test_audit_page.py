@@ -46,6 +46,8 @@ def test_a_log_is_held_against_the_rules() -> None:
     app.query_params["log_row"] = str(rows[int(shown[1]) + 3])
     app.run()
     assert f"Step {int(shown[1]) + 3} of episode {shown[2]}" in texts(app)
+    app.number_input(key="_log_row").set_value(int(rows[int(shown[1]) + 4])).run()
+    assert f"Step {int(shown[1]) + 4} of episode {shown[2]}" in texts(app)
     app.query_params["log_row"] = str(rows[0] - 1)  # of another episode
     app.run()
     assert shown[0] in texts(app)

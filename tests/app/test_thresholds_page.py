@@ -139,6 +139,10 @@ def test_trade_offs_are_drawn() -> None:
     assert "No other thresholds give fewer rules" in texts(app)
     front = specs(app)[-1]["data"][0]  # type: ignore[index]
     assert len(front["customdata"]) > 10
+    (by_name,) = (one for one in app.selectbox if one.label == "Point of the figure")
+    assert len(by_name.options) == len(front["customdata"])
+    by_name.select_index(0).run()
+    assert metrics(app)["Rules"] == by_name.options[0].split()[0]
 
 
 def test_no_rule_is_said_with_what_to_do() -> None:

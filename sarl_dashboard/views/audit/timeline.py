@@ -59,6 +59,12 @@ def _pick(start: int) -> None:
     set_url_choice("log_row", "" if step is None else str(start + step))
 
 
+def _type_row() -> None:
+    """Let the address name the row of the log that was typed, which keys can do as well."""
+    row = st.session_state["_log_row"]
+    set_url_choice("log_row", "" if row is None else str(row))
+
+
 def _chosen_episode(held: Audit) -> slice:
     """The widget for the episode, those with the most breaks first; its rows in the log."""
     table = held.episodes.sort_values("broken", ascending=False, kind="stable")
@@ -83,13 +89,24 @@ def _chosen_episode(held: Audit) -> slice:
 
 
 def _step(rules: ChosenRules, held: Audit, rows: slice) -> None:
-    """One step: the first that broke a rule where none of this episode was clicked."""
+    """One step: the first that broke a rule where none of this episode was chosen."""
     named = url_text("log_row", "", lambda text: re.fullmatch(_ROW, text) is not None)
     row = int(named or -1)
     if row not in range(rows.start, rows.stop):
         broken = np.flatnonzero(held.is_broken[rows])
         if not len(broken):
-            st.caption("No rule was broken in this episode. Click a step to see its rule.")
-            return
-        row = rows.start + int(broken[0])
-    show_step(held, row, rules.choice)
+            st.caption("No rule was broken in this episode. Choose a step to see its rule.")
+        row = rows.start + int(broken[0]) if len(broken) else -1
+    st.session_state["_log_row"] = row if row >= 0 else None
+    st.number_input(
+        f"Row of the log ({rows.start:,} to {rows.stop - 1:,})",
+        rows.start,
+        rows.stop - 1,
+        None,
+        key="_log_row",
+        on_change=_type_row,
+        placeholder="or click a step",
+        width=320,
+    )
+    if row >= 0:
+        show_step(held, row, rules.choice)

@@ -120,7 +120,7 @@ def sentences(
     """What cannot be seen of the dots: how many rules they are, and which are not among them."""
     there = sum(len(dot.rules) for dot in placed)
     most = max(len(dot.rules) for dot in dots)
-    texts = ["Click a dot to see the rule below."]
+    texts = ["Click a dot to see the rule below, or go from rule to rule by the buttons."]
     if most > 1:
         texts.append(
             f"A larger dot is several rules with the same two numbers, here up to {most:,}: "

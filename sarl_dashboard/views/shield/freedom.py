@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import streamlit as st
 
 from sarl_core.explaining.figures.rules.freedom import HERE, FreedomPoint, freedom_figure
+from sarl_core.mining.language import share_text
 from sarl_core.rollouts.episodes import Episodes
 from sarl_core.shipped import DATA
 from sarl_dashboard.cache import cached
@@ -30,13 +31,23 @@ def show_freedom(finished: Sequence[tuple[ShieldLine, Episodes]]) -> None:
         return
     alike = [line.agent == _AGENT and str(line.row.env_id) == _ENVIRONMENT for line, _ in finished]
     shipped = _shipped() if any(alike) else ()
+    drawn = [*shipped, *points]
     with st.expander("Failures against freedom", icon=":material/balance:"):
         chart(
-            freedom_figure([*shipped, *points], front=bool(shipped), dark=is_dark()),
+            freedom_figure(drawn, front=bool(shipped), dark=is_dark()),
             "freedom_figure",
             "Freedom to the right, share of the episodes that fail upwards, for every shield",
         )
         st.caption(_about(shipped, all(alike)))
+        st.dataframe(
+            {
+                "Rules": [one.name for one in drawn],
+                "Freedom": [share_text(one.freedom) for one in drawn],
+                "Failures": [f"{one.failures:,} of {one.episodes:,}" for one in drawn],
+            },
+            hide_index=True,
+            alt="The points of the figure: freedom, and episodes that failed",
+        )
 
 
 def _measured(line: ShieldLine, episodes: Episodes) -> FreedomPoint | None:

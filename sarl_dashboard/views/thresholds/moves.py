@@ -77,6 +77,14 @@ def leave_compact() -> None:
     st.rerun()  # the ring comes back to the maps, and the sidebar says what is in force
 
 
+def use_point(support: float, confidence: float, trees: tuple[PolicyTree, ...]) -> None:
+    """Put a point of the best trade-offs in force, at neat numbers; for callbacks."""
+    neat = neat_point(trees, Thresholds(support, confidence, *chosen_limits()))
+    there = {"support": max(neat.support, least_support()), "confidence": neat.confidence}
+    st.session_state["_clicked"] = there
+    move(**there)
+
+
 def take_click(key: str, trees: tuple[PolicyTree, ...]) -> None:
     """Set both thresholds to those of the clicked cell or point.
 
@@ -89,8 +97,7 @@ def take_click(key: str, trees: tuple[PolicyTree, ...]) -> None:
         values = list(data.values()) if isinstance(data, dict) else list(data)
         support, other = float(values[0]), float(values[1])
         if key == "pareto":
-            clicked = neat_point(trees, Thresholds(support, other, *chosen_limits()))
-            support, other = clicked.support, clicked.confidence
+            use_point(support, other, trees)
         name = "epsilon" if chosen_mode() == FORBID else "confidence"
         st.session_state["_clicked"] = {"support": max(support, least_support()), name: other}
     if clicked_cell := st.session_state.get("_clicked"):
