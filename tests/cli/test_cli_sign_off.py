@@ -68,7 +68,7 @@ def test_where_nothing_is_known_nobody_has_approved(run, place, tmp_path):
     assert json.loads(run("audit", RULES, CART, "--json"))["approved"] is None
     assert "Not approved by anybody." in run("export", RULES, "--out", tmp_path / "shield.md")
     run("report", RULES, *REPORT, tmp_path / "report.html")
-    assert "Not approved by anybody." in (tmp_path / "report.html").read_text()
+    assert "Nobody has yet." in (tmp_path / "report.html").read_text()
     assert not place.exists()
     run("library", "import", RULES)
     assert json.loads(run("audit", RULES, CART, "--json"))["approved"] == []

@@ -12,6 +12,7 @@ from sarl_core.explaining.colours import label_colour
 from sarl_core.explaining.combination_plots import CombinationPlot, combination_plots
 from sarl_core.explaining.html.rule_combinations import combinations_html
 from sarl_core.explaining.report.demonstrations import demonstrations_part
+from sarl_core.explaining.report.rule_set_card import RuleSetCard
 from sarl_core.explaining.report.rules import in_order, rules_part
 from sarl_core.explaining.report.tally import tally
 from sarl_core.explaining.tables.rule_evidence import example_columns
@@ -129,11 +130,11 @@ def test_a_report_counts_what_was_seen_and_says_how_the_picture_is_read() -> Non
     seen = demonstrations_part(rules, data, counts)
     assert "the state of the task, 2 numbers listed below" in seen.sentences[0]
     assert [line.name for line in seen.features] == ["position (m)", "speed (m/s)"]
-    part = rules_part(rules, data, counts, in_order(rules, 9), None)
+    part = rules_part(rules, data, counts, in_order(rules, 9), None, RuleSetCard())
     assert "two features together, as “position plus 2 s of speed”" in part.introduction[-1]
     plain = data.deriving([])
     rules = mine_rules(plain, supp_min=0.01, conf_min=0.95)
-    part = rules_part(rules, plain, tally(rules, plain), in_order(rules, 9), None)
+    part = rules_part(rules, plain, tally(rules, plain), in_order(rules, 9), None, RuleSetCard())
     assert "two features together" not in " ".join(part.introduction)
 
 
