@@ -26,6 +26,8 @@ SHIPPED = {
     "driving_compact.json": ("Driving-v0", 24, 22.0),
 }
 
+SLOW = ("Driving-v0", "BipedalWalker-v3")  # an episode takes a good part of a second
+
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_the_card_is_that_of_the_file(name: str) -> None:
@@ -69,11 +71,12 @@ def test_the_card_names_the_seeds_of_what_happened(name: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SHIPPED)
 def test_they_reach_what_was_promised(name: str) -> None:
-    """As `evaluate --agent novice --seed 100000 --episodes 100` plays them."""
+    """As `evaluate --agent novice --seed 100000` plays them."""
     env_id, most, promised = SHIPPED[name]
+    episodes = 30 if env_id in SLOW else 100
     rules = RuleSet.load(FOLDER / name)
     found = rollout(
-        env_id, "novice", shield=Shield(rules), episodes=100, seed=100_000, keep_steps=False
+        env_id, "novice", shield=Shield(rules), episodes=episodes, seed=100_000, keep_steps=False
     )
     assert max(len(rules.of_dimension(index)) for index in range(len(rules.actions))) <= most
     assert found.statistics.mean >= promised
