@@ -8,7 +8,7 @@ from functools import partial
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.memory import release
-from sarl_core.mining.growing.growth import EXACT_UP_TO, grow_policy_trees
+from sarl_core.mining.growing.growth import EXACT_UP_TO, counted_trees, grow_structures
 from sarl_core.mining.tree import Learner
 from sarl_core.processes import Processes, run_each
 from sarl_dashboard.jobs.job import Job, Place
@@ -47,7 +47,7 @@ def job_of(demonstrations: Demonstrations, divider: int) -> Job[Trees]:
     arguments = growing_of(demonstrations, divider)
     states, divider, learner = arguments
     # Nothing of the dashboard, which a process would have to load for it.
-    grow = partial(grow_policy_trees, divider=divider, learner=learner)
+    grow = partial(grow_structures, divider=divider, learner=learner)
     keep = trees_under_any_name.keeping(*arguments)
     steps = len(demonstrations)
     values = demonstrations.observations.size * demonstrations.action_columns.shape[1]
@@ -68,10 +68,11 @@ def job_of(demonstrations: Demonstrations, divider: int) -> Job[Trees]:
         # Its own process, since growing a tree can be ended in no other way.
         executor = Processes(1, threads=os.cpu_count() or 1)
         try:
-            (trees,) = run_each(grow, [(states,)], executor=executor, progress=progress)
+            (grown,) = run_each(grow, [(states,)], executor=executor, progress=progress)
         finally:
             executor.shutdown(wait=False, cancel_futures=True)
         release()  # they came in one piece, which is as large as they are
-        keep(trees)
+        # Here, where the states are: trees with their counts are several times as large.
+        keep(counted_trees(grown, states, divider=divider, learner=learner))
 
     return Job(key_of(demonstrations, divider), work, 1)

@@ -47,7 +47,7 @@ def test_a_page_waits_for_the_tree_and_goes_on_by_itself() -> None:
 
 
 def test_it_says_how_long_it_takes_and_can_be_called_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(growing, "grow_policy_trees", slow)
+    monkeypatch.setattr(growing, "grow_structures", slow)
     app = open_page("rules", data="cartpole")
     assert app.title[0].value == "Rules"
     assert not app.dataframe
@@ -79,7 +79,7 @@ def failing(*_: object, **__: object) -> None:
 
 
 def test_what_went_wrong_is_said_with_a_way_to_try_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(growing, "grow_policy_trees", failing)
+    monkeypatch.setattr(growing, "grow_structures", failing)
     app = open_page("rules", data="cartpole")
     until = time.monotonic() + WAIT
     while work_of(app).running and time.monotonic() < until:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, PolicyTree, RuleSet, mine_rules
-from sarl_core.explaining.exports.export import CSV_COLUMNS, rules_to_csv
+from sarl_core.explaining.exports import export
+from sarl_core.explaining.exports.export import CSV_COLUMNS, decisions_changed, rules_to_csv
 from sarl_core.mining.rules import Condition
 
 
@@ -84,3 +85,16 @@ def test_text_says_divider_lift_and_depth(two_torques: Demonstrations) -> None:
     assert "lift at least 1.1, at most 4 conditions, divider 3" in text
     assert "\nhip: " in text
     assert "\nknee: " in text
+
+
+def test_changed_decisions_are_counted_over_all_states_piece_by_piece(
+    unfiltered: RuleSet, lander_like: Demonstrations, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone = max(unfiltered.rules, key=lambda one: one.samples)
+    fewer = replace(
+        unfiltered,
+        rules=tuple(replace(rule, enabled=rule is not gone) for rule in unfiltered.rules),
+    )
+    monkeypatch.setattr(export, "_AT_ONCE", len(lander_like) // 3)  # and a few are left
+    assert decisions_changed(unfiltered, fewer, lander_like) == gone.samples
+    assert decisions_changed(unfiltered, unfiltered, lander_like) == 0

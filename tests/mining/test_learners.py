@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,7 +20,7 @@ from sarl_core import (
 )
 from sarl_core.mining.editing.regrowing import next_queries, regrown
 from sarl_core.mining.growing import growth, histogram
-from sarl_core.mining.growing.growth import learner_for
+from sarl_core.mining.growing.growth import counted_trees, grow_structures, learner_for
 from sarl_core.mining.tree import LEAF
 from tests.mining.strategies import labelled_states
 
@@ -259,3 +261,15 @@ def test_auto_takes_the_histogram_learner_for_many_pairs():
 def test_what_is_no_learner_or_support_is_refused(lander_like, options, says):
     with pytest.raises(InputError, match=says):
         grow_policy_trees(lander_like, **options)
+
+
+@pytest.mark.parametrize("learner", ["exact", "histogram"])
+@pytest.mark.parametrize("task", ["cartpole", "lunar_lander_continuous"])
+def test_trees_of_another_process_are_small_on_the_way_and_the_same_when_counted(task, learner):
+    demonstrations = load_demonstrations(f"data/demonstrations/{task}.parquet")
+    options = {"learner": learner, "min_support": 0.001, "divider": 5}
+    sent = pickle.dumps(grow_structures(demonstrations, **options))
+    trees = grow_policy_trees(demonstrations, **options)
+    assert len(sent) < len(pickle.dumps(trees)) / 3
+    counted = counted_trees(pickle.loads(sent), demonstrations, **options)
+    assert [tree.digest for tree in counted] == [tree.digest for tree in trees]

@@ -50,6 +50,7 @@ CSV_COLUMNS = (
     *(f"held_out_{name}" for name in HeldOut._fields),
 )
 
+_AT_ONCE = 50_000  # states that are decided in one go: the records of a million take hundreds of MB
 _NOT_TRIED = (None,) * len(HeldOut._fields)
 
 
@@ -134,12 +135,15 @@ def decisions_changed(before: RuleSet, after: RuleSet, demonstrations: Demonstra
             f"the rules are for {counted(len(before.actions), 'action dimension')} and the "
             f"demonstrations have {dimensions}; choose demonstrations of the rules' environment"
         )
-    one, other = (
-        Shield(rules).decide_batch(demonstrations.observations, demonstrations.action_columns)
-        for rules in (before, after)
-    )
-    differs = (one.rules != other.rules) | (one.executed != other.executed)
-    return int(np.count_nonzero(differs.any(axis=1)))
+    shields = (Shield(before), Shield(after))
+    changed = 0
+    for start in range(0, len(demonstrations), _AT_ONCE):
+        rows = slice(start, start + _AT_ONCE)
+        states, actions = demonstrations.observations[rows], demonstrations.action_columns[rows]
+        one, other = (shield.decide_batch(states, actions) for shield in shields)
+        differs = (one.rules != other.rules) | (one.executed != other.executed)
+        changed += int(np.count_nonzero(differs.any(axis=1)))
+    return changed
 
 
 def export_content(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 from numbers import Integral, Real
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,44 @@ from sarl_core.mining.growing.histogram import BinnedStates, histogram_structure
 from sarl_core.mining.growing.structure import TreeStructure, count_tree, tree_levels
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.tree import LEAF, Learner, PolicyTree
+
+
+@dataclass(frozen=True, eq=False)
+class GrownTree:
+    """A tree that is grown and not yet counted.
+
+    Attributes:
+        structure: Its queries.
+        leaves: The leaf that each of the N pairs reaches, (N,); None where that is not known yet.
+    """
+
+    structure: TreeStructure
+    leaves: NDArray[np.int64] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For other processes, where for a moment there are several copies: in as few bytes."""
+        columns = (*(getattr(self.structure, each.name) for each in _COLUMNS), self.leaves)
+        return _unpacked, tuple(map(_packed, columns))
+
+
+_COLUMNS = fields(TreeStructure)
+
+
+def _packed(column: NDArray[Any] | None) -> NDArray[Any] | None:
+    """Whole numbers in the smallest type that holds them, others as they are."""
+    if column is None or column.dtype.kind != "i" or not len(column):
+        return column
+    ends = (np.min_scalar_type(column.min()), np.min_scalar_type(column.max()))
+    return column.astype(np.promote_types(*ends))
+
+
+def _unpacked(*columns: Any) -> GrownTree:
+    *parts, leaves = (
+        column if column is None or column.dtype.kind == "f" else column.astype(np.int64)
+        for column in columns
+    )
+    return GrownTree(TreeStructure(*parts), leaves)
+
 
 LearnerChoice = Literal["exact", "histogram", "auto"]
 EXACT_UP_TO = 50_000
@@ -82,6 +121,45 @@ def grow_policy_trees(
         InputError: If the divider, the depth, the learner or the support is none, or the pairs are
             a sample.
     """
+    chosen = learner_for(learner, len(demonstrations))
+    grown = grow_structures(
+        demonstrations,
+        divider=divider,
+        max_depth=max_depth,
+        seed=seed,
+        learner=chosen,
+        min_support=min_support,
+    )
+    return counted_trees(
+        grown, demonstrations, divider=divider, learner=chosen, min_support=min_support
+    )
+
+
+def grow_structures(
+    demonstrations: Demonstrations,
+    *,
+    divider: int = 2,
+    max_depth: int | None = None,
+    seed: int = 0,
+    learner: LearnerChoice = "exact",
+    min_support: float = 0.0,
+) -> tuple[GrownTree, ...]:
+    """The first half of `grow_policy_trees`, which may be done by another process.
+
+    Args:
+        demonstrations: As there.
+        divider: Likewise.
+        max_depth: Likewise.
+        seed: Likewise.
+        learner: Likewise.
+        min_support: Likewise.
+
+    Returns:
+        What `counted_trees` takes, one an action dimension.
+
+    Raises:
+        InputError: As there.
+    """
     must = "what trees are grown from must be Demonstrations"
     require(demonstrations, Demonstrations, must, "load them: load_demonstrations(path)")
     require_every_step(demonstrations, "growing trees")
@@ -91,50 +169,78 @@ def grow_policy_trees(
         raise InputError(
             f"the support down to which trees are grown is {quoted(min_support)}; give 0 to 1"
         )
-    chosen = learner_for(learner, len(demonstrations))
     labels = [
         dimension.labels_of(demonstrations.action_columns[:, index])
         for index, dimension in enumerate(label_dimensions(demonstrations, divider))
     ]
-    least = _least(float(min_support), len(demonstrations))
     states = demonstrations.observations
-    if chosen == "histogram":
+    if learner_for(learner, len(demonstrations)) == "histogram":
+        least = _least(float(min_support), len(demonstrations))
         bins = BinnedStates.of(states)
-        structures = [
-            histogram_structure(
-                bins,
-                column,
-                least=least,
-                max_depth=max_depth,
-                seed=seed,
-                last=index == len(labels) - 1,
+        grown = tuple(
+            GrownTree(
+                *histogram_structure(
+                    bins,
+                    column,
+                    least=least,
+                    max_depth=max_depth,
+                    seed=seed,
+                    last=index == len(labels) - 1,
+                )
             )
             for index, column in enumerate(labels)
-        ]
-        release()  # what small nodes have left: counting needs room, too
-        return tuple(
-            replace(
-                count_tree(
-                    structure, demonstrations, index, divider=divider, learner=chosen, leaves=leaves
-                ),
-                least_support=float(min_support),
-            )
-            for index, (structure, leaves) in enumerate(structures)
         )
+        release()  # what small nodes have left: counting needs room, too
+        return grown
 
-    def grown(index: int) -> PolicyTree:
-        structure = exact_structure(states, labels[index], max_depth=max_depth, seed=seed)
-        tree = count_tree(structure, demonstrations, index, divider=divider)
-        cut = tree if least <= 2 else _cut_back(tree, least, demonstrations)
-        return replace(cut, least_support=float(min_support))
+    def exact(column: NDArray[np.int64]) -> GrownTree:
+        return GrownTree(exact_structure(states, column, max_depth=max_depth, seed=seed))
 
     if len(labels) == 1:
-        return (grown(0),)
+        return (exact(labels[0]),)
     from loky import cpu_count
 
     # scikit-learn lets other threads run while it grows a tree.
     with ThreadPoolExecutor(min(len(labels), cpu_count())) as threads:
-        return tuple(threads.map(grown, range(len(labels))))
+        return tuple(threads.map(exact, labels))
+
+
+def counted_trees(
+    grown: Sequence[GrownTree],
+    demonstrations: Demonstrations,
+    *,
+    divider: int,
+    learner: Learner,
+    min_support: float = 0.0,
+) -> tuple[PolicyTree, ...]:
+    """The second half of `grow_policy_trees`: what the expert did at every node.
+
+    Args:
+        grown: What `grow_structures` gave.
+        demonstrations: Those that it was given.
+        divider: Likewise.
+        learner: What grew them.
+        min_support: What was given there.
+
+    Returns:
+        One tree an action dimension.
+    """
+    least = _least(float(min_support), len(demonstrations))
+
+    def counted(index: int, one: GrownTree) -> PolicyTree:
+        tree = count_tree(
+            one.structure,
+            demonstrations,
+            index,
+            divider=divider,
+            learner=learner,
+            leaves=one.leaves,
+        )
+        is_cut = learner == "exact" and least > 2
+        cut = _cut_back(tree, least, demonstrations) if is_cut else tree
+        return replace(cut, least_support=float(min_support))
+
+    return tuple(counted(index, one) for index, one in enumerate(grown))
 
 
 def part_of_tree(
