@@ -7,6 +7,7 @@ Dask client's, fits in wherever an executor is taken.
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable, Generator, Hashable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, wait
@@ -36,7 +37,12 @@ class Processes(Executor):
     """Processes that end with this one; they start when first needed, and anew after a loss."""
 
     def __init__(
-        self, workers: int | None = None, *, gives_way: bool = False, threads: int = 1
+        self,
+        workers: int | None = None,
+        *,
+        gives_way: bool = False,
+        threads: int = 1,
+        without: Sequence[str] = (),
     ) -> None:
         """Start nothing yet.
 
@@ -45,7 +51,10 @@ class Processes(Executor):
             gives_way: Whether other programs go first, as where pages are served meanwhile. On a
                 busy machine the work then takes long; where somebody waits for it, it should not.
             threads: Of each, where what it calls can use several.
+            without: Packages that are not loaded there: some load others wherever they are
+                installed, which takes memory and time also where nothing needs them.
         """
+        self._without = tuple(without)
         self.workers = workers or min(os.cpu_count() or 1, 8)
         self._gives_way, self._threads = gives_way, threads
         self._lock = Lock()
@@ -74,7 +83,7 @@ class Processes(Executor):
                 self.workers,
                 timeout=_IDLE_SECONDS,
                 initializer=_begin,
-                initargs=(os.getpid(), self._gives_way),
+                initargs=(os.getpid(), self._gives_way, self._without),
                 env={"OMP_NUM_THREADS": str(self._threads), **_ALLOCATION},
                 job_reducers={np.ndarray: handed_over},
                 # A process may let go of a result, and of its file, before that is read here.
@@ -125,8 +134,10 @@ def executor_of(jobs: int, executor: Executor | None) -> Executor | None:
     return executor if executor is not None or jobs == 1 else processes(jobs)
 
 
-def _begin(parent: int, gives_way: bool) -> None:
-    """End with the process that asked, and let others go first where they should."""
+def _begin(parent: int, gives_way: bool, without: Sequence[str]) -> None:
+    """End with the process that asked, let others go first where they should, and load less."""
+    for package in without:
+        sys.modules.setdefault(package, None)  # type: ignore[arg-type]  # is then not to be found
     if gives_way and hasattr(os, "nice"):
         os.nice(_NICENESS)
     Thread(target=_end_with, args=(parent,), daemon=True).start()

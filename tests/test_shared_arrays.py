@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import importlib
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sarl_core import Demonstrations, shared_arrays
+from sarl_core import Demonstrations, grow_policy_trees, shared_arrays
 from sarl_core.demonstrations.shared import in_shared_memory
 from sarl_core.processes import Processes
 from sarl_core.shared_arrays import handed_over, shared
@@ -52,6 +53,23 @@ def test_a_process_sees_the_same_numbers() -> None:
     processes = Processes(1)
     try:
         assert processes.submit(np.sum, fixed()).result() == pytest.approx(fixed().sum())
+    finally:
+        processes.shutdown()
+
+
+def grown_without_pandas() -> bool:
+    with pytest.raises(ImportError):
+        importlib.import_module("pandas")
+    states = np.arange(8, dtype=np.float32)[:, None]
+    labels = (states[:, 0] > 3).astype(np.int64)
+    (tree,) = grow_policy_trees(Demonstrations(states, labels, np.zeros(8, dtype=np.int64)))
+    return tree.n_nodes == 3
+
+
+def test_a_process_grows_trees_without_a_package_that_they_have_no_use_for() -> None:
+    processes = Processes(1, without=("pandas",))
+    try:
+        assert processes.submit(grown_without_pandas).result()
     finally:
         processes.shutdown()
 

@@ -66,7 +66,8 @@ def job_of(demonstrations: Demonstrations, divider: int) -> Job[Trees]:
             return job.wanted()
 
         # Its own process, since growing a tree can be ended in no other way.
-        executor = Processes(1, threads=os.cpu_count() or 1)
+        # scikit-learn would load pandas, of which a tree has no use: a third of its memory.
+        executor = Processes(1, threads=os.cpu_count() or 1, without=("pandas",))
         try:
             (grown,) = run_each(grow, [(states,)], executor=executor, progress=progress)
         finally:

@@ -7,9 +7,9 @@ import time
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from sarl_core.errors import WorkError
 from sarl_dashboard.cache import RESULTS
 from sarl_dashboard.jobs import growing
+from tests.app.growing_work import failing, slow
 from tests.app.screens import errors, metrics, open_page, page_file, texts
 
 WAIT = 60.0
@@ -20,10 +20,6 @@ def many(monkeypatch: pytest.MonkeyPatch) -> None:
     """The shipped states count as many, and no tree of theirs is there."""
     monkeypatch.setattr(growing, "EXACT_UP_TO", 1_000)
     RESULTS.clear()
-
-
-def slow(*_: object, **__: object) -> None:
-    time.sleep(WAIT)
 
 
 def work_of(app: AppTest) -> growing.Job[growing.Trees]:
@@ -72,10 +68,6 @@ def test_it_says_how_long_it_takes_and_can_be_called_off(monkeypatch: pytest.Mon
     app.run()
     assert "Cancelled" not in texts(app)
     assert not app.exception
-
-
-def failing(*_: object, **__: object) -> None:
-    raise WorkError("the memory is full; close something")
 
 
 def test_what_went_wrong_is_said_with_a_way_to_try_again(monkeypatch: pytest.MonkeyPatch) -> None:
