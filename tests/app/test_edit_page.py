@@ -134,6 +134,7 @@ def test_a_rule_by_hand_is_previewed_added_moved_changed_and_removed() -> None:
     assert table(app)["Action"].tolist()[:2] == [["push right"], ["push left"]]
     assert table(app)["Decides"].tolist()[:2] == [int(states.sum()), 0]
     click(app, "change_rule")
+    assert f"Change {second}" in [header.value for header in app.header]
     app.number_input(key=draft(app, "at_0")).set_value(0.05).run()
     click(app, draft(app, "save"))
     assert any(label.startswith(f"Undo: change {second}") for label in labels(app))

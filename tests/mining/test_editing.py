@@ -216,7 +216,7 @@ EDITED = apply(FINE, [Pin(FINE.rules[0]), Add(manual(FINE, ABOVE))])
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
-        (Switch("0.99999", True), "no rule '0.99999'"),
+        (Switch("0.99999", True), "not in force any more"),
         (Pin(FINE.rules[0]), "already"),
         (Unpin(FINE.rules[3].id), "not pinned"),
         (Unpin("manual.1"), "not pinned"),
@@ -232,6 +232,9 @@ def test_an_edit_that_cannot_be_made_says_why(edit, words):
     with pytest.raises(InputError, match=words) as caught:
         check_edit(EDITED, edit)
     assert "\n" not in str(caught.value)
+    # People call a rule by its name, and see its id nowhere.
+    assert EDITED.names.get(edit.rule_id, "the rule ") in str(caught.value)
+    assert edit.rule_id not in str(caught.value)
 
 
 def test_an_edit_that_can_be_made_passes():
@@ -363,7 +366,7 @@ def test_a_rule_without_an_action_or_one_nobody_knows_is_refused():
 def test_a_rule_that_is_there_already_is_refused_but_not_one_that_overrules_it():
     mined = FINE.rules[0]
     asks = asks_of(mined, FINE)
-    with pytest.raises(InputError, match=f"rule {mined.id} asks and says the same; pin it"):
+    with pytest.raises(InputError, match=f"^{FINE.name_of(mined)} asks and says the same; pin it"):
         manual(FINE, *reversed(asks), action=mined.action)
     off = apply(FINE, [Switch(mined.id, False)])
     with pytest.raises(InputError, match="switch it on"):

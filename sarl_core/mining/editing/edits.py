@@ -311,33 +311,32 @@ def check_edit(rule_set: RuleSet, edit: Edit) -> None:
     rule = next((one for one in rule_set.rules if one.id == edit.rule_id), None)
     if isinstance(edit, Add):
         if rule is not None:
-            raise InputError(f"there is a rule {edit.rule_id!r} already; give another name")
+            raise InputError(f"{rule_set.name_of(rule)} has that id already; give another")
         return
-    if rule is None:
-        raise InputError(f"there is no rule {edit.rule_id!r} in force; choose one of the table")
+    if rule is None:  # so it has no name either
+        raise InputError("the rule is not in force any more; choose one of the table")
+    name = rule_set.name_of(rule)
     if isinstance(edit, Pin) and rule.placed:
-        raise InputError(f"rule {rule.id} has its place already; move it up or down")
+        raise InputError(f"{name} has its place already; move it up or down")
     if isinstance(edit, Unpin) and not (rule.pinned and rule.origin == "mined"):
-        raise InputError(f"rule {rule.id} is not pinned; choose one that is")
+        raise InputError(f"{name} is not pinned; choose one that is")
     if isinstance(edit, (Change, Remove)) and rule.origin != "manual":
         raise InputError(
-            f"rule {rule.id} was mined and stays what it is; switch it off, or add one by hand"
+            f"{name} was mined and stays what it is; switch it off, or add one by hand"
         )
     if isinstance(edit, Move):
         _check_move(rule_set, rule, up=edit.up)
 
 
 def _check_move(rule_set: RuleSet, rule: Rule, *, up: bool) -> None:
+    name = rule_set.name_of(rule)
     if not rule.placed:
         raise InputError(
-            f"rule {rule.id} has no place among the others, as mined rules never overlap; pin it "
-            "first"
+            f"{name} has no place among the others, as mined rules never overlap; pin it first"
         )
     peers = peers_of(rule, rule_set.rules)
     if peers[0 if up else -1] == rule.id:
-        raise InputError(
-            f"rule {rule.id} is the {'first' if up else 'last'} of the placed rules already"
-        )
+        raise InputError(f"{name} is the {'first' if up else 'last'} of the placed rules already")
 
 
 def next_manual_id(rule_set: RuleSet, history: History = History()) -> str:

@@ -195,7 +195,7 @@ def _refuse_duplicate(rule_set: RuleSet, rule: Rule) -> None:
             instead = "pin it" if other.origin == "mined" else "move it up"
             if not other.enabled:
                 instead = "switch it on"
-            raise InputError(f"rule {other.id} asks and says the same; {instead} instead")
+            raise InputError(f"{rule_set.name_of(other)} asks and says the same; {instead} instead")
 
 
 def _says(rule: Rule) -> int | tuple[int, ...]:

@@ -136,10 +136,10 @@ def form(base: Base, now: Verdicts) -> None:
     """The form and the preview."""
     draft = draft_of(base)
     filling = Filling(base, now, draft)
-    if not any(rule.id == draft.changing for rule in now.rule_set.rules):
+    changing = now.rule_set.names.get(draft.changing)
+    if changing is None:
         draft.changing = ""  # it was removed meanwhile: what was filled in makes a new one
-    changing = draft.changing
-    st.header(f"Change {escaped(changing)}" if changing else "Add a rule by hand")
+    st.header(f"Change {changing}" if changing else "Add a rule by hand")
     with st.container(border=True, key="manual"):
         asks = [_condition(base, draft, row) for row in list(draft.rows)]
         st.button(
