@@ -36,18 +36,18 @@ def action_column(
         meaning: Help.
         forbidding: Never-rules among the rules, each in the colour of what it forbids.
     """
-    colours = {
-        action_text(label, dimension): chip_colour(label_colour(label))
+    labels = {
+        action_text(label, dimension): label
         for dimension in actions
         for label in range(dimension.n_labels)
-    } | {says_text(rule, actions[rule.dimension]): label_colour(rule.label) for rule in forbidding}
+    } | {says_text(rule, actions[rule.dimension]): rule.label for rule in forbidding}
     # About seven pixels a letter; what a long action takes, the conditions give.
-    width = min(max(150, 30 + 7 * max(map(len, colours), default=0)), 250)
+    width = min(max(150, 30 + 7 * max(map(len, labels), default=0)), 250)
     column = st.column_config.MultiselectColumn(
         width=width,
         help=meaning,
-        options=list(colours),
-        color=list(colours.values()),
+        options=list(labels),
+        color=[chip_colour(label_colour(label)) for label in labels.values()],
     )
     return column, width
 

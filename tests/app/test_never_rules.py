@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, Shield, load_demonstrations
+from sarl_core.explaining.colours import chip_colour, label_colour
 from sarl_core.mining.never.never_rules import mine_never_rules
 from sarl_core.mining.rule_set import rules_to_json
 from sarl_core.shipped import DATA
@@ -54,6 +57,9 @@ def test_a_link_opens_the_rules_with_the_way_through_the_tree(mined: RuleSet) ->
     assert {action for (action,) in table["Action"]} == {
         f"never {name}" for name in mined.actions[0].label_names
     }
+    chips = json.loads(app.dataframe[0].proto.columns)["Action"]["type_config"]["options"]
+    colours = {chip["value"]: chip["color"] for chip in chips}
+    assert colours["never fire left engine"] == chip_colour(label_colour(1))
     assert "then never do nothing: the expert did not in 97.5 % of 9,682 states" in html(app)
     assert "From the root to the rule" in html(app)
     app.selectbox(key="action").set_value("never fire main engine").run()

@@ -22,6 +22,8 @@ PAGES = {
     "names": "Names",
     "episodes": "Episodes",
     "thresholds": "Thresholds",
+    "thresholds?mode=forbid": "Thresholds",
+    "thresholds?mode=both": "Thresholds",
     "rules": "Rules",
     "evidence": "Evidence",
     "what_if": "What if",
@@ -83,7 +85,7 @@ def held_in_both_themes(screen: Page) -> dict[str, list[str]]:
 def test_everybody_can_use_every_page_as_it_opens(screen: Page) -> None:
     found = {}
     for path, title in PAGES.items():
-        visit(screen, f"/{path}?data=cartpole", title)
+        visit(screen, f"/{path}{'&' if '?' in path else '?'}data=cartpole", title)
         found |= held_in_both_themes(screen)
         no_trace(screen)
     assert not found, json.dumps(found, indent=1)
