@@ -6,14 +6,12 @@ from pathlib import Path
 
 import streamlit as st
 
-from sarl_dashboard.session import is_dark
-
 _PICTURES = Path(__file__).parents[2] / "pictures"
 ICON = str(_PICTURES / "icon.png")  # a named icon would come from the network
 
 
 def show_logo() -> None:
     """Logo and name at the top of the sidebar; the logo alone where the sidebar is closed."""
-    # A picture cannot know the theme that a visitor has chosen in the menu.
-    name = "logo_dark.svg" if is_dark() else "logo_light.svg"
-    st.logo(str(_PICTURES / name), size="large", icon_image=ICON)
+    # Browsers tell a picture the theme of what it stands in, were it chosen in the menu or changed
+    # while the page is open; the server hears of it with the next run alone.
+    st.logo(str(_PICTURES / "logo.svg"), size="large", icon_image=ICON)
