@@ -12,7 +12,7 @@ import streamlit as st
 from sarl_core.mining.language import counted
 from sarl_dashboard.jobs.episodes import EpisodeBatch, Row, known, run_batch
 from sarl_dashboard.jobs.job import Job, Place, Result
-from sarl_dashboard.text import refuse
+from sarl_dashboard.text import escaped, refuse
 
 # Pixels, and not as wide as there is room: the button that was pressed stays beside for a moment,
 # and a Cancel that moves when it goes is missed by who is pressing it.
@@ -64,7 +64,7 @@ def run_bar(
     job = place.job
     if job is not None and job.running:
         with st.container(horizontal=True, vertical_alignment="center"):
-            st.progress(job.share, job.text, width=_PROGRESS)
+            st.progress(job.share, escaped(job.text), width=_PROGRESS)
             st.button(cancel, icon=cancel_icon, on_click=job.cancel, key=f"cancel_{place.name}")
         return
     if place.at_work:

@@ -204,11 +204,15 @@ class Place(Generic[Result]):
 
         What another page is still about was only looked at here, and goes on.
         """
-        if self.job is not None and self.job.is_here:
-            self.job.cancel()
+        self._call_off()
         job = start()
         job.place = self.name
         self._look_at(job)
+
+    def clear(self) -> None:
+        """Call off what was begun here, and look at nothing."""
+        self._call_off()
+        st.session_state.pop(f"_job_{self.name}", None)
 
     def find_again(self, key: object) -> bool:
         """Look at work that this visitor began here in another page, where none was begun since.
@@ -233,6 +237,10 @@ class Place(Generic[Result]):
         if job.is_left:
             job.take_over()
         self._look_at(job)
+
+    def _call_off(self) -> None:
+        if self.job is not None and self.job.is_here:
+            self.job.cancel()
 
     def _look_at(self, job: Job[Result]) -> None:
         st.session_state[f"_job_{self.name}"] = job

@@ -169,14 +169,33 @@ def stored_edits(item: Item, rule_set: RuleSet) -> tuple[Edit, ...]:
 
 
 def keep(data: Demonstrations | MinedData, name: str) -> str:
-    """Keep what was uploaded.
+    """Keep what was uploaded, and remember where.
 
     Args:
         data: Read and checked.
         name: Of the file.
 
     Returns:
-        Its id; the one that it has where its author keeps the same already.
+        Its id.
+
+    Raises:
+        SarlError: If it cannot be kept.
+    """
+    item = upload_item(data, name)
+    _ids()[_steps_digest(data)] = item.id
+    _say_room(library())
+    return item.id
+
+
+def upload_item(data: Demonstrations | MinedData, name: str) -> Item:
+    """Keep what was uploaded; for work beside the page too.
+
+    Args:
+        data: Read and checked.
+        name: Of the file.
+
+    Returns:
+        What is kept; where its author keeps the same already, that.
 
     Raises:
         SarlError: If it cannot be kept.
@@ -190,14 +209,10 @@ def keep(data: Demonstrations | MinedData, name: str) -> str:
         if (one.author, one.details.get("mined", "")) == (author(), mined)
     ]
     if known:
-        item = known[0]
-    elif isinstance(data, MinedData):
-        item = add_mined(opened, data, name, author=author())
-    else:
-        item = add_demonstrations(opened, data, name, author=author())
-    _ids()[_steps_digest(data)] = item.id
-    _say_room(opened)
-    return item.id
+        return known[0]
+    if isinstance(data, MinedData):
+        return add_mined(opened, data, name, author=author())
+    return add_demonstrations(opened, data, name, author=author())
 
 
 def details_of(demonstrations: Demonstrations) -> Mapping[str, Any]:

@@ -12,7 +12,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import Demonstrations
 from sarl_dashboard.views.demonstrations import upload as view
-from tests.app.screens import errors, metrics, open_page, texts
+from tests.app.screens import ROUTER, errors, metrics, open_page, page_file, texts
 from tests.app.test_demonstrations_page import upload
 from tests.bad_inputs import ROWS, csv_bytes
 
@@ -77,6 +77,59 @@ def test_a_file_that_is_taken_away_is_not_read_any_further(slow: threading.Event
     app.run()
     assert not app.exception
     assert metrics(app)["Steps"] == "15,000"
+
+
+def progress(app: AppTest) -> str:
+    return " ".join(bar.proto.text for bar in app.get("progress"))
+
+
+@pytest.mark.parametrize("looked", [True, False])
+def test_reading_goes_on_when_the_page_is_left(slow: threading.Event, *, looked: bool) -> None:
+    app = upload(open_page("demonstrations", data="cartpole"), ("my_own.csv", csv_bytes(*ROWS)))
+    job = app.session_state["_job_reading"]
+    app.switch_page("library.py").run()
+    if looked:
+        app.switch_page("demonstrations.py").run()
+        assert not app.file_uploader(key="upload_files").value
+        assert "Reading my\\_own.csv" in progress(app)
+        app.button(key="cancel_reading").click().run()
+        assert job.cancelled
+        app.button(key="run_reading").click().run()  # of the same file
+        assert metrics(app)["Steps"] == "15,000"
+    slow.set()
+    finished(app).switch_page("demonstrations.py").run()
+    assert not app.exception
+    assert not errors(app)
+    assert metrics(app)["Steps"] == "5"
+    assert app.query_params["data"] not in ("upload", "cartpole")
+
+
+def test_a_page_that_was_left_helps_with_what_is_wrong_with_the_file(
+    slow: threading.Event,
+) -> None:
+    content = csv_bytes(*ROWS, header="episode,step,obs_x,obs_y,thrust")
+    app = upload(open_page("demonstrations"), ("mine.csv", content))
+    app.switch_page("library.py").run()
+    slow.set()
+    finished(app).switch_page("demonstrations.py").run()
+    assert errors(app)[0].startswith("mine.csv: there is no action")
+    assert app.toggle(key="map_columns").value
+
+
+def test_another_page_finds_what_is_read_and_the_library_keeps_it(slow: threading.Event) -> None:
+    # A name that no other test uploads.
+    left = upload(open_page("demonstrations", data="cartpole"), ("left.csv", csv_bytes(*ROWS[:4])))
+    job = left.session_state["_job_reading"]
+    assert "left.csv" in progress(open_page("library", data="cartpole"))
+    anew = open_page("demonstrations", data="cartpole")  # as after it was loaded anew
+    assert anew.session_state["_job_reading"] is job
+    assert "Reading left.csv" in progress(anew)
+    slow.set()
+    finished(left)  # and nothing looks at it
+    later = AppTest.from_file(ROUTER, default_timeout=120)
+    later.query_params["data"] = job.address.removeprefix("demonstrations?data=")
+    later.run().switch_page(page_file("demonstrations")).run()
+    assert metrics(later)["Steps"] == "4"
 
 
 def test_what_is_wrong_with_a_large_file_is_one_sentence_and_the_form_helps() -> None:

@@ -6,6 +6,8 @@ import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import streamlit as st
@@ -20,66 +22,27 @@ from sarl_core.errors import InputError, SarlError
 from sarl_core.memory import release
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.distributed.mined_files import is_mined_file, read_mined_data
+from sarl_core.mining.language import counted
 from sarl_core.processes import run_each
 from sarl_dashboard.components.column_form import ColumnForm, previews_of
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.queue import memory_shortage
+from sarl_dashboard.state import library
 from sarl_dashboard.state.data import set_upload, steps_of, uncombined_demonstrations
 from sarl_dashboard.state.environments import registered, usual_environments
 from sarl_dashboard.state.url import with_own
 from sarl_dashboard.text import refuse
 from sarl_dashboard.views.demonstrations.stored_files import StoredFile, stored_files
 
+_UPLOADER = "upload_files"
 _LEFT_OUT = "--missing drop"  # what an error says where steps that lack a value can be left out
 _Looked = dict[tuple[str, ...], Sequence[ColumnPreview]]  # by the ids of the files
 _LOGGER = logging.getLogger(__name__)
-PLACE = Place[Demonstrations | MinedData]("reading")
 _AT_ONCE = 20_000_000  # bytes that are read while one waits
 _BYTES_A_SECOND = 30_000_000  # of text, which takes longest
 _MOST = 0.95  # of a bar that only knows how long such work usually takes
-
-
-def uploaded_files() -> Sequence[StoredFile]:
-    """The files in the uploader."""
-    return stored_files("upload_files")
-
-
-def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
-    """Read what was uploaded; keep what was chosen before where that fails.
-
-    Args:
-        columns: Which column is what; guessed where not given.
-    """
-    st.session_state.pop("_upload_error", None)
-    st.session_state["_upload_columns"] = columns
-    if PLACE.job is not None:
-        PLACE.job.cancel()
-    files = uploaded_files()
-    if not files:
-        return
-    try:
-        if shortage := memory_shortage():
-            raise InputError(f"{shortage}, so nothing is read now; try again in a few minutes")
-        if sum(file.size for file in files) > _AT_ONCE:
-            PLACE.begin(_job_of(_request()))
-            return
-        with st.spinner("Reading and checking …"):
-            upload = _read(_request())
-    except SarlError as error:
-        st.session_state["_upload_error"] = str(error)
-        return
-    _take(upload)
-
-
-def _take(upload: Demonstrations | MinedData) -> None:
-    """Keep what was read, and choose it."""
-    release()  # what reading has left, before writing needs room
-    with st.spinner("Keeping it in the library …"):
-        set_upload(upload, file_name=", ".join(file.name for file in uploaded_files()))
-    release()
-    st.toast(f"Read {steps_of(upload).whole.steps:,} steps.", icon=":material/check:")
 
 
 class _Request(NamedTuple):
@@ -90,12 +53,85 @@ class _Request(NamedTuple):
     env_id: Environment | None
     missing: Missing
 
+    @property
+    def name(self) -> str:
+        """Of what is read."""
+        return ", ".join(file.name for file in self.files)
+
+    @property
+    def title(self) -> str:
+        """The same, short however many files there are."""
+        others = len(self.files) - 1
+        first = self.files[0].name
+        return f"{first} and {counted(others, 'other file')}" if others else first
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Large files that are read beside the page, and what came of it so far.
+
+    Attributes:
+        request: What is to be read.
+        previews: Of the columns; None while nobody has looked at them.
+        upload: What was read; None while it is not.
+    """
+
+    request: _Request
+    previews: Sequence[ColumnPreview] | None
+    upload: Demonstrations | MinedData | None = None
+
+
+PLACE = Place[Reading]("reading")
+_ANY = "upload"  # whichever files they are: a page that was left does not know them any more
+
+
+def uploaded_files() -> Sequence[StoredFile]:
+    """The files in the uploader; where the page was left, which empties it, those being read."""
+    reading = PLACE.job.result if PLACE.job is not None else None
+    return stored_files(_UPLOADER) or (reading.request.files if reading is not None else ())
+
+
+def read_upload(columns: Mapping[str, ColumnRole] | None = None) -> None:
+    """Read what was uploaded; keep what was chosen before where that fails.
+
+    Args:
+        columns: Which column is what; guessed where not given.
+    """
+    st.session_state.pop("_upload_error", None)
+    st.session_state["_upload_columns"] = columns
+    files = uploaded_files()
+    if not files:
+        return
+    try:
+        if shortage := memory_shortage():
+            raise InputError(f"{shortage}, so nothing is read now; try again in a few minutes")
+        request = _request()
+        if sum(file.size for file in files) > _AT_ONCE:
+            PLACE.begin(_job_of(request))
+            return
+        with st.spinner("Reading and checking …"):
+            upload = _read(request)
+    except SarlError as error:
+        PLACE.clear()
+        st.session_state["_upload_error"] = str(error)
+        return
+    _take(upload, request.name)
+
+
+def _take(upload: Demonstrations | MinedData, name: str) -> None:
+    """Keep what was read, and choose it."""
+    release()  # what reading has left, before writing needs room
+    with st.spinner("Keeping it in the library …"):
+        set_upload(upload, file_name=name)
+    release()
+    st.toast(f"Read {steps_of(upload).whole.steps:,} steps.", icon=":material/check:")
+
 
 def _request() -> _Request:
     """What the uploader holds, with what is said of it."""
     return _Request(
         uploaded_files(),
-        st.session_state["_upload_columns"],
+        st.session_state.get("_upload_columns"),
         environment(),
         "drop" if st.session_state.get("upload_missing") else "refuse",
     )
@@ -128,59 +164,65 @@ def _read(request: _Request) -> Demonstrations | MinedData:
         ) from error
 
 
-def _job_of(request: _Request) -> Callable[[], Job[Demonstrations | MinedData]]:
+def _job_of(request: _Request) -> Callable[[], Job[Reading]]:
     """What begins to read large files beside the page."""
-    key = _uploaded()
+    looked: _Looked = st.session_state.get("_upload_previews", {})
+    reading = Reading(request, looked.get(_ids(request.files)))
     size = sum(file.size for file in request.files)
-    # The columns are looked at first: beside demonstrations that are read they need too much room.
-    looked: _Looked = st.session_state.setdefault("_upload_previews", {})
 
-    def work(job: Job[Demonstrations | MinedData]) -> None:
+    def work(job: Job[Reading]) -> None:
         begun = time.monotonic()
 
         def progress(done: int, total: int) -> bool:
             seconds = time.monotonic() - begun
-            job.text = f"Reading and checking {size / 1e6:,.0f} MB: {seconds:.0f} s"
+            job.text = f"Reading {request.title} ({size / 1e6:,.0f} MB): {seconds:.0f} s"
             job.done = min(seconds * _BYTES_A_SECOND / size, _MOST)
             return job.wanted()
 
         # A thread: what it has read is many times as large as what is said of it, and whoever calls
         # it off need not wait for its end.
         executor = ThreadPoolExecutor(1)
+        previews = reading.previews
         try:
-            if key not in looked:
-                looked.clear()
-                (looked[key],) = run_each(
+            if previews is None:  # at first: beside what is read they need too much room
+                (previews,) = run_each(
                     previews_of, [(request.files,)], executor=executor, progress=progress
                 )
+                job.result = replace(reading, previews=previews)
                 release()
-            (job.result,) = run_each(_read, [(request,)], executor=executor, progress=progress)
+            (upload,) = run_each(_read, [(request,)], executor=executor, progress=progress)
         finally:
             executor.shutdown(wait=False)
+        release()
+        job.text = f"Keeping {request.title} in the library …"
+        with suppress(SarlError):  # a page that looks says that keeping fails
+            job.address = f"demonstrations?data={library.upload_item(upload, request.name).id}"
+        job.result = Reading(request, previews, upload)
 
-    return lambda: Job(key, work, 1)
+    return lambda: Job(_ANY, work, 1, reading, lasts=True)
 
 
-def _uploaded() -> tuple[str, ...]:
-    return tuple(file.file_id for file in uploaded_files())
+def _ids(files: Sequence[StoredFile]) -> tuple[str, ...]:
+    return tuple(file.file_id for file in files)
+
+
+def _find_reading() -> None:
+    """Look at what this visitor has left being read, where nothing else is uploaded here."""
+    if not stored_files(_UPLOADER) and PLACE.find_again(_ANY):
+        job = PLACE.job
+        assert job is not None
+        assert job.result is not None
+        st.session_state["_upload_columns"] = job.result.request.columns
 
 
 def _show_reading() -> bool:
     """How far reading beside the page is, or that it was called off; whether either is so."""
     job = PLACE.job
-    if job is None or job.key != _uploaded():
+    if job is None:
         return False
-    upload, error = job.result, job.error
-    if not job.running and (upload is not None or error is not None) and not job.cancelled:
-        job.result = job.error = None
-        if upload is not None:
-            _take(upload)
-        else:
-            st.session_state["_upload_error"] = str(error)
-        if not st.session_state.get("_upload_mapped"):
-            _form().open_for(st.session_state.get("_upload_error"))
-        st.rerun()
     if not (job.running or job.cancelled):
+        if _finish(job):
+            st.rerun()
         return False
     offer = Offer(
         key=job.key,
@@ -191,6 +233,27 @@ def _show_reading() -> bool:
         label="Read",
     )
     watched(PLACE, lambda _: run_bar(PLACE, offer))
+    return True
+
+
+def _finish(job: Job[Reading]) -> bool:
+    """Take what was read, or what was wrong with it; whether that was still to be done."""
+    if not (job.is_here or job.is_left):
+        PLACE.clear()  # another page of this visitor takes it
+        return True
+    reading, error = job.result, job.error
+    if reading is None or (reading.upload is None and error is None):
+        return False
+    if reading.previews is not None:
+        st.session_state["_upload_previews"] = {_ids(reading.request.files): reading.previews}
+    if reading.upload is not None:
+        job.result = None
+        _take(reading.upload, reading.request.name)
+    else:
+        job.error = None
+        st.session_state["_upload_error"] = str(error)
+    if not st.session_state.get("_upload_mapped"):
+        _form().open_for(st.session_state.get("_upload_error"))
     return True
 
 
@@ -211,7 +274,8 @@ def environment() -> Environment | None:
 
 def _form() -> ColumnForm:
     looked: _Looked = st.session_state.get("_upload_previews", {})
-    return ColumnForm.of_files("map", uploaded_files(), previews=looked.get(_uploaded()))
+    files = uploaded_files()
+    return ColumnForm.of_files("map", files, previews=looked.get(_ids(files)))
 
 
 def _read_mapped() -> None:
@@ -229,8 +293,10 @@ def _read_mapped() -> None:
 def read_new_upload() -> None:
     """Read what was uploaded just now; open the form where the columns are not clear."""
     # Streamlit calls a file whose content it no longer has another one, and says so once.
-    if (uploaded := _uploaded()) and uploaded == st.session_state.get("_upload_ids"):
+    uploaded = _ids(stored_files(_UPLOADER))
+    if uploaded and uploaded == st.session_state.get("_upload_ids"):
         return
+    PLACE.clear()  # it is about other files
     st.session_state["_upload_ids"] = uploaded
     st.session_state["_upload_mapped"] = False
     read_upload()
@@ -240,14 +306,17 @@ def read_new_upload() -> None:
 
 def upload_section(*, expanded: bool) -> None:
     """Upload files, say what is wrong with them, map their columns."""
+    _find_reading()
     with st.expander(
-        "Use your own demonstrations", icon=":material/upload_file:", expanded=expanded
+        "Use your own demonstrations",
+        icon=":material/upload_file:",
+        expanded=expanded or bool(uploaded_files()),
     ):
         left, right = st.columns([3, 2], gap="medium")
         left.file_uploader(
             "A file, several of one kind, or the ZIP of a folder",
             accept_multiple_files=True,
-            key="upload_files",
+            key=_UPLOADER,
             on_change=read_new_upload,
             help=with_words(
                 "Parquet, CSV, TSV, JSON lines, Arrow, Excel, HDF5 (D4RL) or NPZ, text also as "
