@@ -1,4 +1,8 @@
-"""The keys' way to a row of a table: boxes at the left of rows take a pointer alone."""
+"""The keys' way to a row of a table, by its name.
+
+Shift and Space tick the box of the row whose cell the arrow keys have reached. But a table that
+opens with a row selected, as most here do, has no such cell until one is clicked.
+"""
 
 from __future__ import annotations
 
