@@ -1,7 +1,7 @@
 """The keys' way to a row of a table, by its name.
 
 Shift and Space tick the box of the row whose cell the arrow keys have reached. But a table that
-opens with a row selected, as most here do, has no such cell until one is clicked.
+opens with a row selected, as that of Edit does, has no such cell until one is clicked.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ class _Request(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class LargeUpload:
     """Large files that are read beside the page, and what came of it so far.
 
     Attributes:
@@ -81,7 +81,7 @@ class Reading:
     upload: Demonstrations | MinedData | None = None
 
 
-PLACE = Place[Reading]("reading")
+PLACE = Place[LargeUpload]("reading")
 _ANY = "upload"  # whichever files they are: a page that was left does not know them any more
 
 
@@ -164,13 +164,13 @@ def _read(request: _Request) -> Demonstrations | MinedData:
         ) from error
 
 
-def _job_of(request: _Request) -> Callable[[], Job[Reading]]:
+def _job_of(request: _Request) -> Callable[[], Job[LargeUpload]]:
     """What begins to read large files beside the page."""
     looked: _Looked = st.session_state.get("_upload_previews", {})
-    reading = Reading(request, looked.get(_ids(request.files)))
+    reading = LargeUpload(request, looked.get(_ids(request.files)))
     size = sum(file.size for file in request.files)
 
-    def work(job: Job[Reading]) -> None:
+    def work(job: Job[LargeUpload]) -> None:
         begun = time.monotonic()
 
         def progress(done: int, total: int) -> bool:
@@ -197,7 +197,7 @@ def _job_of(request: _Request) -> Callable[[], Job[Reading]]:
         job.text = f"Keeping {request.title} in the library …"
         with suppress(SarlError):  # a page that looks says that keeping fails
             job.address = f"demonstrations?data={library.upload_item(upload, request.name).id}"
-        job.result = Reading(request, previews, upload)
+        job.result = LargeUpload(request, previews, upload)
 
     return lambda: Job(_ANY, work, 1, reading, lasts=True)
 
@@ -236,7 +236,7 @@ def _show_reading() -> bool:
     return True
 
 
-def _finish(job: Job[Reading]) -> bool:
+def _finish(job: Job[LargeUpload]) -> bool:
     """Take what was read, or what was wrong with it; whether that was still to be done."""
     if not (job.is_here or job.is_left):
         PLACE.clear()  # another page of this visitor takes it
