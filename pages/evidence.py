@@ -17,7 +17,13 @@ from sarl_dashboard.session import end_page
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.data import all_demonstrations, mined_data, require_demonstrations
 from sarl_dashboard.state.mined import fidelity_at
-from sarl_dashboard.state.thresholds import BOTH, FORBID, chosen_epsilon, chosen_mode
+from sarl_dashboard.state.thresholds import (
+    BOTH,
+    DEMAND,
+    chosen_confidence,
+    chosen_epsilon,
+    chosen_mode,
+)
 from sarl_dashboard.views.evidence.contradictions import show_contradictions
 from sarl_dashboard.views.evidence.evidence import chosen_evidence
 from sarl_dashboard.views.evidence.held_out import hold_out_choice
@@ -32,20 +38,19 @@ st.caption(
     "how many of them, each counted once because its steps are alike."
 )
 require_demonstrations()
-if chosen_mode() == BOTH:
-    st.info(
-        "This page holds rules against one share that they have to reach, and those that demand "
-        "and those that forbid have one each; choose one kind on the page Thresholds. What both "
-        "are worth together in other episodes stands there, and what each is on the page Rules.",
-        icon=":material/block:",
-    )
-    end_page()
-forbids = chosen_mode() == FORBID
+forbids = chosen_mode() != DEMAND
 if forbids:
     st.caption(
         "A rule that forbids is right in a state if the expert did not do there what it forbids. "
         f"At an epsilon of {threshold_text(chosen_epsilon())} it should be in at least "
         f"{share_text(1.0 - chosen_epsilon())} of the states of an episode."
+    )
+if chosen_mode() == BOTH:
+    st.caption(
+        "A rule that demands should be right in at least the minimum confidence, "
+        f"{share_text(chosen_confidence())}. Each rule is tried in all states that it applies to. "
+        "All together are judged as they are used: where a rule that demands applies, those that "
+        "forbid have no say."
     )
 if forbids and mined_data() is not None:
     st.info(

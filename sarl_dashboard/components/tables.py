@@ -17,7 +17,6 @@ from sarl_core.mining.evidence import FEWEST_EPISODES
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
-from sarl_core.mining.validation.holding_out import least_confidence
 from sarl_dashboard.components.journey.words import word_help
 
 ROW_HEIGHT = 33  # pixels, at the theme's font size
@@ -118,10 +117,7 @@ def frame(rules: Sequence[Rule], rule_set: RuleSet, names: Sequence[str]) -> Any
     columns["Action"] = [[action] for action in columns["Action"]]
     columns["Rule"] = list(names)
     order: tuple[str, ...] = ("Rule", "Action", "When")
-    tried = held_out_columns(
-        rules,
-        [least_confidence(rule_set.thresholds, forbids=bool(rule.forbids)) for rule in rules],
-    )
+    tried = held_out_columns(rules, rule_set.thresholds)
     if tried:
         tried["Verdict"] = [[word] for word in tried["Verdict"]]
         # Next to what they compare with; the rarer measures go to the end.

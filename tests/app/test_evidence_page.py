@@ -64,7 +64,7 @@ def until(app: AppTest, words: str) -> str:
 
 def test_the_page_says_what_the_library_counts() -> None:
     app = open_page("evidence", **HELD)
-    counts = verdict_counts(tried().rules, 0.95)
+    counts = verdict_counts(tried().rules, tried().thresholds)
     assert metrics(app) == {
         "Rules": str(len(tried())),
         "Held-out fidelity": held_out_fidelity(),
@@ -78,7 +78,7 @@ def test_the_page_says_what_the_library_counts() -> None:
     assert table["Rule"].tolist() == [tried().name_of(rule) for rule in rules]
     assert table["Held out"].tolist() == [held_out_text(rule.held_out) for rule in rules]
     assert table["Mined from"].tolist() == [mined_text(rule) for rule in rules]
-    missing = list(map(more_text, more_episodes(rules, 30, 0.95)))
+    missing = list(map(more_text, more_episodes(rules, 30, tried().thresholds)))
     assert table["Still missing"].tolist() == missing
     judged = judge(tried(), count_rules(tried(), parted().held_out))
     assert judged_sentence(judged) in html(app)

@@ -14,13 +14,25 @@ import pytest
 from sarl_core import RuleSet, grow_policy_trees, load_demonstrations, mine_rules
 from sarl_core.explaining.report.provenance import mined_again, mining_command
 from sarl_core.explaining.words.cross_fit import judged_sentence
-from sarl_core.explaining.words.evidence import VERDICTS, held_out_text, verdict_counts
+from sarl_core.explaining.words.evidence import (
+    VERDICTS,
+    held_out_text,
+    more_text,
+    verdict_counts,
+    verdicts_text,
+)
 from sarl_core.mining.editing.edits import Add, Switch, apply
 from sarl_core.mining.editing.manual_rules import Ask, manual_rule
 from sarl_core.mining.language import share_text
-from sarl_core.mining.never.never_rules import mine_at, mine_never_rules, with_never_rules
+from sarl_core.mining.never.never_rules import (
+    mine_at,
+    mine_never_rules,
+    never_thresholds,
+    with_never_rules,
+)
+from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.validation.cross_fitting import cross_fit, judge_pairs
-from sarl_core.mining.validation.holding_out import hold_out, with_held_out
+from sarl_core.mining.validation.holding_out import hold_out, more_episodes, with_held_out
 from sarl_core.shielding.leeway import leeway_of
 from sarl_core.shipped import DATA
 from tests.app.screens import errors, html, metrics, open_page, page_file, texts
@@ -115,7 +127,7 @@ def test_evidence_says_of_held_out_episodes_what_the_command_says() -> None:
     app = open_page("evidence", **FORBID, holdout="0.3")
     split = hold_out(LANDER, 0.3)
     rules = with_held_out(mine_never_rules(split.mined, epsilon=0.1, supp_min=0.01), split.held_out)
-    counts = verdict_counts(rules.rules, 0.9)
+    counts = verdict_counts(rules.rules, rules.thresholds)
     assert (len(rules), counts["reached"], counts["below"]) == (16, 1, 0)
     judged = judge_pairs(rules, split.held_out)
     assert judged.fidelity.share is not None
@@ -203,7 +215,47 @@ def test_rules_that_forbid_are_edited_and_in_force_on_every_page(rules: RuleSet)
         assert "edits" in app.query_params
 
 
+def test_evidence_holds_each_of_both_kinds_against_its_own_share() -> None:
+    app = open_page("evidence", **BOTH, holdout="0.3")
+    split = hold_out(LANDER, 0.3)
+    rules = with_held_out(mine_at(grow_policy_trees(split.mined), AT_BOTH), split.held_out)
+    demanding = [rule for rule in rules if not rule.forbids]
+    forbidding = [rule for rule in rules if rule.forbids]
+    judged, shown = judge_pairs(rules, split.held_out), metrics(app)
+    assert judged.fidelity.share is not None
+    assert shown["Rules"] == str(len(rules))
+    assert shown["Held-out fidelity"] == share_text(judged.fidelity.share, decimals=1)
+    apart = [
+        verdict_counts(demanding, Thresholds(0.005, 0.95)),
+        verdict_counts(forbidding, never_thresholds(0.1)),
+    ]
+    for name in ("reached", "open", "below", "unknown"):
+        assert shown[VERDICTS[name].capitalize()] == str(sum(one[name] for one in apart))
+    read = unescape(html(app))
+    assert judged_sentence(judged) in read
+    for kind, some in (("demand", demanding), ("forbid", forbidding)):
+        verdicts = verdicts_text(some, AT_BOTH)
+        assert f"Rules that {kind} ({len(some)}): {verdicts}." in read
+    ordered = [
+        rule for some in (demanding, forbidding) for rule in sorted(some, key=lambda r: -r.samples)
+    ]
+    table = app.dataframe[0].value
+    assert list(table["Rule"]) == [rules.name_of(rule) for rule in ordered]
+    episodes = LANDER.n_episodes
+    assert list(table["Still missing"]) == [
+        more_text(one)
+        for some, at in (
+            (ordered[: len(demanding)], Thresholds(0.005, 0.95)),
+            (ordered[len(demanding) :], never_thresholds(0.1)),
+        )
+        for one in more_episodes(some, episodes, at)
+    ]
+    assert "in at least 90 % of the states" in texts(app)
+    assert "those that forbid have no say" in texts(app)
+
+
 BOTH = FORBID | {"mode": "both", "confidence": "0.95", "support": "0.005"}
+AT_BOTH = Thresholds(0.005, 0.95, never=0.1)
 
 
 def test_rules_that_demand_with_others_behind_them(tmp_path: Path) -> None:
@@ -235,7 +287,6 @@ def test_rules_that_demand_with_others_behind_them(tmp_path: Path) -> None:
         app.switch_page(page_file(page)).run()
         assert not app.exception
         assert not errors(app), page
-    assert "one share that they have to reach" in texts(open_page("evidence", **BOTH))
     # What a file says is what its thresholds mean: both kinds, or one.
     for rules in (both, demanding, mine_never_rules(trees, epsilon=0.1, supp_min=0.005)):
         rules.save(tmp_path / "rules.json")

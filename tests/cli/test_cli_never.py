@@ -8,8 +8,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from sarl_core import RuleSet
+from sarl_core import RuleSet, load_demonstrations
 from sarl_core.cli.app import main
+from sarl_core.explaining.words.evidence import verdict_counts
+from sarl_core.mining.never.never_rules import never_thresholds
+from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.validation.cross_fitting import judge_pairs
+from sarl_core.mining.validation.holding_out import hold_out
 
 LANDER = "data/demonstrations/lunar_lander.parquet"
 CART = "data/demonstrations/cartpole.parquet"
@@ -50,6 +55,26 @@ def test_rules_that_forbid_behind_rules_that_demand(typed, tmp_path):
     assert document["thresholds"]["never"] == 0.1
     assert 0 < document["freedom"] < 1
     assert 0 < document["coverage"] <= 1
+
+
+def test_each_kind_is_held_against_its_own_share_in_other_episodes(typed, tmp_path):
+    out = tmp_path / "both.json"
+    options = ("--setting", "filtered", "--never", "0.1", "--hold-out", "0.3", "--out", str(out))
+    code, told, _ = typed("mine", LANDER, *options, "--json")
+    assert code == 0
+    rules, held_out = RuleSet.load(out), json.loads(told)["held_out"]
+    parted = [
+        verdict_counts([rule for rule in rules if rule.kind == kind], at)
+        for kind, at in (
+            ("do", Thresholds(0.005, 0.95)),
+            ("never", never_thresholds(0.1)),
+        )
+    ]
+    assert all(sum(one.values()) for one in parted)
+    for name, count in verdict_counts(rules.rules, rules.thresholds).items():
+        assert held_out[f"rules_{name}"] == count == sum(one[name] for one in parted)
+    split = hold_out(load_demonstrations(LANDER), 0.3)
+    assert held_out["fidelity"] == judge_pairs(rules, split.held_out).fidelity.share
 
 
 def test_what_is_left_to_an_agent_is_told(typed, tmp_path):

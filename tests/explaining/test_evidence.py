@@ -239,7 +239,7 @@ def test_the_bar_marks_the_threshold_and_stays_within_its_scale():
 
 
 def test_columns_hold_what_was_counted(tried):
-    columns = held_out_columns(tried.rules, [0.85] * len(tried))
+    columns = held_out_columns(tried.rules, tried.thresholds)
     assert list(columns) == ["Held out", "Verdict", "Lower bound"]
     for rule, text, bound in zip(
         tried.rules, columns["Held out"], columns["Lower bound"], strict=True
@@ -247,17 +247,20 @@ def test_columns_hold_what_was_counted(tried):
         assert text.endswith(("episodes", "episode", "no states"))
         low = rule.held_out.low
         assert bound == (low if low is None else pytest.approx(100 * low))
-    counts = verdict_counts(tried.rules, 0.85)
+    counts = verdict_counts(tried.rules, tried.thresholds)
     said = ("too low", "open", "reached", "too few episodes")
     words = [columns["Verdict"].count(word) for word in said]
     assert words == [counts[name] for name in ("below", "open", "reached", "unknown")]
-    assert held_out_columns([replace(rule, held_out=None) for rule in tried.rules], []) == {}
+    assert (
+        held_out_columns([replace(rule, held_out=None) for rule in tried.rules], tried.thresholds)
+        == {}
+    )
 
 
 def test_tables_have_a_row_a_rule(tried):
-    missing = more_episodes(tried.rules, 20, 0.85)
+    missing = more_episodes(tried.rules, 20, tried.thresholds)
     moved = [Influence(3, 100, 0.9, 0.8)] * len(tried)
-    columns = enough_columns(tried.rules, tried, missing, 0.85, moved)
+    columns = enough_columns(tried.rules, tried, missing, moved)
     assert columns["Rule"] == [f"R{place}" for place in range(1, len(tried) + 1)]
     assert columns["Held out"] == [held_out_text(rule.held_out) for rule in tried.rules]
     assert columns["Still missing"] == [more_text(more) for more in missing]

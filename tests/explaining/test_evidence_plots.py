@@ -33,7 +33,7 @@ def whiskers(html: str) -> list[tuple[float, float, float, float]]:
 
 
 def test_the_overview_draws_every_interval_where_it_lies(tried: RuleSet) -> None:
-    html = overview_plot(tried.rules, tried, 0.85)
+    html = overview_plot(tried.rules, tried)
     drawn = whiskers(html)
     assert len(drawn) == 2 * len(tried)
     ticks = re.findall(r'class="y" style="bottom:([\d.]+)%">([\d.]+) %<', html)
@@ -63,7 +63,7 @@ def test_the_overview_draws_every_interval_where_it_lies(tried: RuleSet) -> None
 
 def test_without_held_out_episodes_there_is_one_dot_a_rule(tried: RuleSet) -> None:
     alone = replace(tried, rules=tuple(replace(rule, held_out=None) for rule in tried.rules))
-    drawn = whiskers(overview_plot(alone.rules, alone, 0.85))
+    drawn = whiskers(overview_plot(alone.rules, alone))
     assert [height for _, _, height, _ in drawn] == [0.0] * len(tried)
 
 
@@ -71,7 +71,7 @@ def test_rules_stand_above_their_names_and_many_rules_above_some(tried: RuleSet)
     largest = sorted(tried.rules, key=lambda rule: -rule.samples)
 
     def named(rules: list[Rule], rule_set: RuleSet) -> list[str]:
-        return re.findall(r'class="x"[^>]*>([^<]+)<', overview_plot(rules, rule_set, 0.85))
+        return re.findall(r'class="x"[^>]*>([^<]+)<', overview_plot(rules, rule_set))
 
     names = [f"R{tried.rules.index(rule) + 1}" for rule in largest]
     assert names != sorted(names)
@@ -83,9 +83,29 @@ def test_rules_stand_above_their_names_and_many_rules_above_some(tried: RuleSet)
     assert named(backwards, many) == [f"R{201 - place}" for place in range(25, 201, 25)]
 
 
+def test_what_each_kind_has_to_reach_is_a_line_below_its_rules(tried: RuleSet) -> None:
+    line = r'class="least" style="left:([\d.]+)%;width:([\d.]+)%;bottom:([\d.]+)%'
+    (alone,) = re.findall(line, overview_plot(tried.rules, tried))
+    assert [float(one) for one in alone[:2]] == [0.0, 100.0]
+    forbidding = tuple(replace(rule, forbids=(0,)) for rule in tried.rules[:1])
+    both = replace(
+        tried,
+        rules=(*tried.rules, *forbidding),
+        thresholds=replace(tried.thresholds, never=0.05),
+    )
+    html = overview_plot(both.rules, both)
+    drawn = [[float(part) for part in one] for one in re.findall(line, html)]
+    share = 100 * len(tried) / len(both)
+    assert [one[0] for one in drawn] == pytest.approx([0.0, share], abs=0.01)
+    assert [one[1] for one in drawn] == pytest.approx([share, 100 - share], abs=0.01)
+    assert drawn[0][2] < drawn[1][2]
+    assert "the minimum confidence, 85 %, and for rules that forbid 1 − epsilon, 95 %," in html
+    assert "those that demand and then those that forbid" in html
+
+
 def test_names_in_the_overview_are_no_markup(tried: RuleSet) -> None:
     action = replace(tried.actions[0], label_names=("<b>x</b>", '"y"'))
-    html = overview_plot(tried.rules, replace(tried, actions=(action,)), 0.85)
+    html = overview_plot(tried.rules, replace(tried, actions=(action,)))
     assert "<b>x" not in html
     assert "&lt;b&gt;x&lt;/b&gt;" in html
 

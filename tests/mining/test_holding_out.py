@@ -14,7 +14,7 @@ from scipy import stats
 from sarl_core import Demonstrations, InputError, grow_policy_trees, mine_rules, threshold_landscape
 from sarl_core.mining.evidence import HeldOut, held_out_of
 from sarl_core.mining.rule_set import rules_from_json, rules_to_json
-from sarl_core.mining.rules import Condition, Rule
+from sarl_core.mining.rules import Condition, Rule, Thresholds
 from sarl_core.mining.validation.episode_counts import count_rules
 from sarl_core.mining.validation.holding_out import (
     best_lower_bound,
@@ -238,7 +238,7 @@ def test_what_a_rule_was_mined_from_says_nothing_of_it():
     for rule in (rule_of(100_000, 99_999), rule_of(100_000, 99_999, [1.0] * 4)):
         assert lower_bound(rule) == 0.0
         assert verdict(rule, 0.5) == "unknown"
-        assert np.isnan(more_episodes([rule], 10, 0.5)).all()
+        assert np.isnan(more_episodes([rule], 10, Thresholds(0.0, 0.5))).all()
     shares = [1.0, 0.9, 1.0, 0.8, 0.9, 1.0]
     assert lower_bound(rule_of(100, 98, shares)) == pytest.approx(t_interval(shares)[0])
 
@@ -319,18 +319,24 @@ def test_more_episodes_go_on_as_those_before():
     needed = next(
         n for n in range(6, 10_000) if low_end(n, np.mean(shares), np.var(shares, ddof=1)) >= 0.9
     )
-    found, enough, never = more_episodes(
-        [rule_of(60, 58, shares), rule_of(60, 58, [1.0] * 40), rule_of(60, 58, [0.8] * 40)], 30, 0.9
-    )
+    rules = [rule_of(60, 58, some) for some in (shares, [1.0] * 40, [0.8] * 40)]
+    found, enough, never = more_episodes(rules, 30, Thresholds(0.0, 0.9))
     assert found == np.ceil((needed - 6) * 30 / 6)
     assert enough == 0
     assert never == np.inf
+    # Of both kinds each has to reach its own: those that forbid all but epsilon.
+    both = Thresholds(0.0, 1.0, never=0.1)
+    forbidding = [replace(rule, forbids=(1,)) for rule in rules]
+    assert more_episodes([*rules, *forbidding], 30, both) == (
+        *more_episodes(rules, 30, Thresholds(0.0, 1.0)),
+        *(found, enough, never),
+    )
 
 
 def test_where_both_ends_are_cut_off_the_most_uneven_is_assumed():
     rule = replace(rule_of(60, 58), held_out=HeldOut(50, 30, 5, 0.6, 0.0, 1.0))
     needed = next(n for n in range(5, 10_000) if low_end(n, 0.6, 0.3) >= 0.5)
-    assert more_episodes([rule], 5, 0.5) == (needed - 5,)
+    assert more_episodes([rule], 5, Thresholds(0.0, 0.5)) == (needed - 5,)
 
 
 # --- the landscape --------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.mining.validation.cross_fitting import Judged
 from sarl_core.mining.validation.episode_counts import Influence
-from sarl_core.mining.validation.holding_out import Shortfall, Verdict, best_lower_bound
+from sarl_core.mining.validation.holding_out import Shortfall, best_lower_bound
 
 
 class Tried(NamedTuple):
@@ -57,7 +57,7 @@ def describe_tried(rule_set: RuleSet, tried: Tried) -> dict[str, Any]:
         A document for JSON.
     """
     fidelity = tried.judged.fidelity
-    counts = _verdicts(rule_set)
+    counts = verdict_counts(rule_set.rules, rule_set.thresholds)
     return {
         "share": tried.share,
         "seed": tried.seed,
@@ -149,7 +149,7 @@ def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
         facts.append(("lower bound", shortfall_text(tried.short)))
     if not len(rule_set):
         return facts
-    counts, least = _verdicts(rule_set), "the minimum confidence"
+    counts, least = verdict_counts(rule_set.rules, rule_set.thresholds), "the minimum confidence"
     if rule_set.forbids:
         never = share_text(1.0 - (rule_set.thresholds.never or 0.0))
         alone = all(rule.forbids for rule in rule_set.rules)
@@ -163,19 +163,6 @@ def tried_facts(rule_set: RuleSet, tried: Tried) -> list[tuple[str, str]]:
         )
     )
     return facts
-
-
-def _verdicts(rule_set: RuleSet) -> dict[Verdict, int]:
-    """How many rules have each verdict, by what they were mined at.
-
-    A rule that forbids says that the expert does otherwise in all but epsilon of its states.
-    """
-    at = rule_set.thresholds
-    forbidding = [rule for rule in rule_set.rules if rule.forbids]
-    demanding = [rule for rule in rule_set.rules if not rule.forbids]
-    counts = verdict_counts(demanding, at.confidence)
-    others = verdict_counts(forbidding, 1.0 - (at.never or 0.0))
-    return {name: count + others[name] for name, count in counts.items()}
 
 
 def none_left(tried: Tried | None, *, forbids: bool = False) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import groupby
 
 import numpy as np
 from markupsafe import Markup
@@ -12,51 +13,52 @@ from sarl_core.explaining.html.plot import Axis, Part, Scale, area, plot
 from sarl_core.explaining.ticks import round_ticks, tick_text
 from sarl_core.explaining.words.evidence import (
     VERDICT_COLOURS,
-    VERDICTS,
     evidence_text,
     held_out_interval_text,
-    least_text,
-    verdict_counts,
+    limits_text,
+    verdicts_text,
 )
 from sarl_core.mining.action_words import says_text
 from sarl_core.mining.evidence import Interval
 from sarl_core.mining.language import counted, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
-from sarl_core.mining.validation.holding_out import verdict
+from sarl_core.mining.validation.holding_out import least_confidence, verdict
 
 _ASIDE = 0.17  # of a rule's place: what it was mined from to the left, held out to the right
 _FEW = 60  # rules up to which whiskers are drawn wide
 _NAMED = 30  # rules up to which each has its name written
 _CLOSE = 10  # names that stand side by side in a narrow window
 _TIPS = 60
+_BOTH = "those that demand and then those that forbid, of each kind "
 _MINED = faded(MUTED_COLOUR, 0.7)
 
 
-def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) -> Markup:
+def overview_plot(rules: Sequence[Rule], rule_set: RuleSet) -> Markup:
     """What is known of many rules, side by side.
 
     Args:
-        rules: In the order in which they stand from left to right; at least one.
-        rule_set: Knows the names.
-        threshold: The minimum confidence, drawn as a line.
+        rules: In the order in which they stand from left to right, those that demand before those
+            that forbid; at least one.
+        rule_set: Knows the names and the thresholds: what rules have to reach is drawn as a line.
 
     Returns:
         HTML. Grey: the confidence on what each was mined from, a dot. In colour:
         held out, with the interval where there is one.
     """
-    few = len(rules) <= _FEW
+    few, forbidding = len(rules) <= _FEW, sum(bool(rule.forbids) for rule in rules)
+    least = [least_confidence(rule, rule_set.thresholds) for rule in rules]
     drawn: list[tuple[float, Interval | None, float, str]] = []
-    for place, rule in enumerate(rules, 1):
+    for place, (rule, needed) in enumerate(zip(rules, least, strict=True), 1):
         held = rule.held_out
         aside = _ASIDE * few if held is not None else 0.0
         if rule.samples:
             drawn.append((place - aside, None, rule.confidence, _MINED))
         if held is not None and held.share is not None:
-            colour = VERDICT_COLOURS[verdict(rule, threshold)]
+            colour = VERDICT_COLOURS[verdict(rule, needed)]
             drawn.append((place + aside, held.interval, held.share, colour))
     ends = [interval.low if interval is not None else share for _, interval, share, _ in drawn]
-    floor = max(min([threshold, *ends]) - 0.03, 0.0)
+    floor = max(min([*least, *ends]) - 0.03, 0.0)
     across, upwards = Scale(0.5, len(rules) + 0.5), Scale(floor, 1.01)
     parts = []
     for at, held_out_interval, share, colour in drawn:
@@ -69,9 +71,17 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
                 f"--at:{_within(share, interval)}",
             )
         )
-    parts.append(Part("least", f"bottom:{upwards.place(threshold)}"))
-    counts = verdict_counts(rules, threshold)
-    verdicts = ", ".join(f"{count:,} {VERDICTS[name]}" for name, count in counts.items())
+    begin = 0.5
+    for needed, same in groupby(least):
+        end = begin + len(list(same))
+        parts.append(
+            Part(
+                "least",
+                f"left:{across.place(begin)};width:{across.length(begin, end)};"
+                f"bottom:{upwards.place(needed)}",
+            )
+        )
+        begin = end
     named = (
         [float(place) for place in range(1, len(rules) + 1)]
         if len(rules) <= _NAMED
@@ -84,7 +94,7 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
             across,
             named,
             [rule_set.name_of(rules[round(place) - 1]) for place in named],
-            "Rules, the most support first",
+            f"Rules, {_BOTH if 0 < forbidding < len(rules) else ''}the most support first",
         ),
         Axis(
             upwards,
@@ -93,8 +103,8 @@ def overview_plot(rules: Sequence[Rule], rule_set: RuleSet, threshold: float) ->
             "Confidence",
         ),
         label=f"The confidence of {counted(len(rules), 'rule')} against "
-        f"{least_text(rule_set.thresholds)}, {share_text(threshold)}, with the 95 % intervals of "
-        f"what was held out: {verdicts}",
+        f"{limits_text(rule_set.thresholds)}, with the 95 % intervals of what was held out: "
+        f"{verdicts_text(rules, rule_set.thresholds)}",
         height=262,
         tips=[_tip(rule, rule_set) for rule in rules],
         css=f"sarl-overview{' sarl-few' * few}{' sarl-close' * (len(named) > _CLOSE)}",

@@ -20,21 +20,21 @@ from sarl_core.mining.action_words import label_text, says_text
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.language import conditions_text
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.rules import Rule
+from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.validation.contradictions import Contradictions, EpisodeContradictions
 from sarl_core.mining.validation.episode_counts import Influence
-from sarl_core.mining.validation.holding_out import verdict
+from sarl_core.mining.validation.holding_out import least_confidence, verdict
 from sarl_core.mining.validation.stability import Stability
 
 Columns = dict[str, list[object]]
 
 
-def held_out_columns(rules: Sequence[Rule], least: Sequence[float]) -> Columns:
+def held_out_columns(rules: Sequence[Rule], thresholds: Thresholds) -> Columns:
     """What the held-out episodes say of rules, to stand beside `rule_columns`.
 
     Args:
         rules: Some rules.
-        least: What the confidence of each has to reach.
+        thresholds: At which they were mined.
 
     Returns:
         Column name to one value a rule, the bound in percent; {} where nothing was held out.
@@ -43,9 +43,7 @@ def held_out_columns(rules: Sequence[Rule], least: Sequence[float]) -> Columns:
         return {}
     return {
         "Held out": [held_out_text(rule.held_out) for rule in rules],
-        "Verdict": [
-            VERDICTS[verdict(rule, needed)] for rule, needed in zip(rules, least, strict=True)
-        ],
+        "Verdict": _verdicts(rules, thresholds),
         "Lower bound": [
             None if held is None or held.low is None else 100 * held.low
             for held in (rule.held_out for rule in rules)
@@ -53,20 +51,22 @@ def held_out_columns(rules: Sequence[Rule], least: Sequence[float]) -> Columns:
     }
 
 
+def _verdicts(rules: Sequence[Rule], thresholds: Thresholds) -> list[object]:
+    return [VERDICTS[verdict(rule, least_confidence(rule, thresholds))] for rule in rules]
+
+
 def enough_columns(
     rules: Sequence[Rule],
     rule_set: RuleSet,
     missing: Sequence[float],
-    threshold: float,
     influences: Sequence[Influence | None],
 ) -> Columns:
     """What is still missing of each rule.
 
     Args:
         rules: Some rules of the set.
-        rule_set: Knows the names.
+        rule_set: Knows the names and the thresholds.
         missing: What `more_episodes` gives of each.
-        threshold: The minimum confidence.
         influences: The episode that moves the share of each most.
 
     Returns:
@@ -78,7 +78,7 @@ def enough_columns(
         "Still missing": [more_text(more) for more in missing],
         "Held out": [held_out_text(rule.held_out) for rule in rules],
         "Interval": [held_out_interval_text(rule.held_out) for rule in rules],
-        "Verdict": [VERDICTS[verdict(rule, threshold)] for rule in rules],
+        "Verdict": _verdicts(rules, rule_set.thresholds),
         "Mined from": [mined_text(rule) for rule in rules],
         "Moved most by": [moved_text(one) for one in influences],
         "When": [conditions_text(rule, rule_set) for rule in rules],

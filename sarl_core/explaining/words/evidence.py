@@ -19,6 +19,7 @@ from sarl_core.mining.validation.holding_out import (
     Verdict,
     best_lower_bound,
     episodes_needed,
+    least_confidence,
     verdict,
 )
 from sarl_core.mining.validation.stability import Band
@@ -283,23 +284,43 @@ def never_text(missing: Sequence[float]) -> str:
 
 def least_text(thresholds: Thresholds) -> str:
     """What the confidence of a rule has to reach: of one that forbids, all but epsilon."""
-    return "the minimum confidence" if thresholds.never is None else "1 − epsilon"
+    if thresholds.never is None:
+        return "the minimum confidence"
+    if not thresholds.demands:
+        return "1 − epsilon"
+    return "the minimum confidence (1 − epsilon where a rule forbids)"
 
 
-def verdict_counts(rules: Sequence[Rule], threshold: float) -> dict[Verdict, int]:
+def limits_text(thresholds: Thresholds) -> str:
+    """The same with how much that is, as "the minimum confidence, 95 %"."""
+    parts = []
+    if thresholds.demands:
+        parts.append(f"the minimum confidence, {share_text(thresholds.confidence)}")
+    if thresholds.never is not None:
+        parts.append(f"1 − epsilon, {share_text(1.0 - thresholds.never)}")
+    return parts[0] if len(parts) == 1 else f"{parts[0]}, and for rules that forbid {parts[1]}"
+
+
+def verdict_counts(rules: Sequence[Rule], thresholds: Thresholds) -> dict[Verdict, int]:
     """How many rules have each verdict.
 
     Args:
         rules: With what was held out, if anything was.
-        threshold: The minimum confidence.
+        thresholds: At which they were mined.
 
     Returns:
         One count a verdict.
     """
     counts: dict[Verdict, int] = dict.fromkeys(VERDICTS, 0)
     for rule in rules:
-        counts[verdict(rule, threshold)] += 1
+        counts[verdict(rule, least_confidence(rule, thresholds))] += 1
     return counts
+
+
+def verdicts_text(rules: Sequence[Rule], thresholds: Thresholds) -> str:
+    """The same, as "0 too low, 3 open, 5 reached, 2 too few episodes"."""
+    counts = verdict_counts(rules, thresholds)
+    return ", ".join(f"{count:,} {VERDICTS[name]}" for name, count in counts.items())
 
 
 def band_text(band: Band, feature: Feature) -> str:

@@ -164,9 +164,9 @@ def best_lower_bound(episodes: int) -> float:
     return held_out_of([1] * episodes, [1] * episodes).low or 0.0
 
 
-def least_confidence(thresholds: Thresholds, *, forbids: bool) -> float:
+def least_confidence(rule: Rule, thresholds: Thresholds) -> float:
     """What the confidence of a rule has to reach: of one that forbids, all but epsilon."""
-    return 1.0 - (thresholds.never or 0.0) if forbids else thresholds.confidence
+    return 1.0 - (thresholds.never or 0.0) if rule.forbids else thresholds.confidence
 
 
 def verdict(rule: Rule, threshold: float) -> Verdict:
@@ -257,13 +257,13 @@ def with_lower_bound(rule_set: RuleSet, least: float) -> RuleSet:
     )
 
 
-def episodes_needed(share: Floats, spread: Floats, threshold: float) -> Floats:
+def episodes_needed(share: Floats, spread: Floats, threshold: float | Floats) -> Floats:
     """Episodes after which the lower end of the interval reaches a threshold.
 
     Args:
         share: Mean share of an episode, which stays so, (R,).
         spread: Variance of these shares between episodes, which stays so too, (R,).
-        threshold: To be reached.
+        threshold: To be reached, by all or by each, (R,).
 
     Returns:
         Whole numbers; infinity where it is never reached, or not within `_MOST_EPISODES`.
@@ -285,8 +285,10 @@ def episodes_needed(share: Floats, spread: Floats, threshold: float) -> Floats:
     return np.where(never, np.inf, high)
 
 
-def more_episodes(rules: Sequence[Rule], episodes: int, threshold: float) -> tuple[float, ...]:
-    """Episodes still missing until each `lower_bound` reaches a threshold, at the present rate.
+def more_episodes(
+    rules: Sequence[Rule], episodes: int, thresholds: Thresholds
+) -> tuple[float, ...]:
+    """Episodes still missing until each `lower_bound` is what it has to be, at the present rate.
 
     Of every further episodes, the same share is held out, and a rule applies in the same share of
     those; it is right in them as often as so far, and as unevenly.
@@ -294,7 +296,7 @@ def more_episodes(rules: Sequence[Rule], episodes: int, threshold: float) -> tup
     Args:
         rules: With what was held out.
         episodes: Demonstrated so far, the held-out ones among them.
-        threshold: The minimum confidence.
+        thresholds: Of the rules, as `least_confidence` reads them.
 
     Returns:
         Whole numbers, 0 where it is reached; infinity where it never is at this rate, and NaN
@@ -314,9 +316,10 @@ def more_episodes(rules: Sequence[Rule], episodes: int, threshold: float) -> tup
     share = np.array([share for _, _, share in known])
     there = np.array([held.episodes for _, held, _ in known], dtype=np.float64)
     spread = np.array([_spread(held) for _, held, _ in known])
-    missing = episodes_needed(share, spread, threshold) - there
+    least = np.array([least_confidence(rules[at], thresholds) for at in place])
+    missing = episodes_needed(share, spread, least) - there
     more = np.maximum(np.ceil(missing * episodes / there), 1.0)
-    sure = np.array([(held.low or 0.0) >= threshold for _, held, _ in known])
+    sure = np.array([held.low or 0.0 for _, held, _ in known]) >= least
     needed[place] = np.where(sure, 0.0, more)
     return tuple(needed.tolist())
 

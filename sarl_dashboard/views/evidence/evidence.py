@@ -9,7 +9,7 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.validation.cross_fitting import Judged, judge, judge_pairs
 from sarl_core.mining.validation.episode_counts import Influence, count_rules, most_influential
-from sarl_core.mining.validation.holding_out import least_confidence, more_episodes
+from sarl_core.mining.validation.holding_out import more_episodes
 from sarl_dashboard.cache import cached
 from sarl_dashboard.state.data import data_parts, mined_data
 from sarl_dashboard.state.hold_out import Parts
@@ -21,16 +21,14 @@ class Findings:
     """What the page says of a rule set.
 
     Attributes:
-        rules: The most support first.
+        rules: Those that demand before those that forbid, of each kind the most support first.
         missing: Episodes that each still misses.
-        threshold: What the confidence of each has to reach.
         judged: All of them together on the episodes held out; None where there are none.
         influences: The held-out episode that moves the share of each rule most.
     """
 
     rules: tuple[Rule, ...]
     missing: tuple[float, ...]
-    threshold: float
     judged: Judged | None
     influences: tuple[Influence | None, ...]
 
@@ -75,11 +73,10 @@ def chosen_evidence() -> RuleSetEvidence:
 @cached(show_spinner="Weighing the evidence …")
 def _findings(evidence: RuleSetEvidence) -> Findings:
     rule_set, held_out = evidence.rule_set, evidence.parts.held_out
-    rules = tuple(sorted(rule_set, key=lambda rule: -rule.samples))
-    threshold = least_confidence(rule_set.thresholds, forbids=rule_set.forbids)
-    missing = more_episodes(rules, evidence.episodes, threshold)
+    rules = tuple(sorted(rule_set, key=lambda rule: (bool(rule.forbids), -rule.samples)))
+    missing = more_episodes(rules, evidence.episodes, rule_set.thresholds)
     if not evidence.held_out:
-        return Findings(rules, missing, threshold, None, (None,) * len(rules))
+        return Findings(rules, missing, None, (None,) * len(rules))
     ordered = replace(rule_set, rules=rules)
     if evidence.mined is not None:
         counts = evidence.mined.count_rules(ordered)
@@ -95,4 +92,4 @@ def _findings(evidence: RuleSetEvidence) -> Findings:
         if rule_set.forbids and held_out is not None
         else judge(rule_set, counts)
     )
-    return Findings(rules, missing, threshold, judged, influences)
+    return Findings(rules, missing, judged, influences)

@@ -24,7 +24,6 @@ def _enough(evidence: RuleSetEvidence) -> Any:
         findings.rules,
         evidence.rule_set,
         findings.missing,
-        findings.threshold,
         findings.influences,
     )
     # A list of one, which the table shows in the action's colour.

@@ -52,7 +52,7 @@ def show_stability(evidence: RuleSetEvidence) -> None:
             )
         )
         st.caption(
-            "A rule has come back if a new one with the same action covers mostly the same "
+            "A rule has come back if a new one that says the same covers mostly the same "
             f"states: those that both cover are at least {share_text(SAME_RULE)} of those that "
             "either covers. In brackets: where nine in ten of the new thresholds lay."
         )
