@@ -47,10 +47,9 @@ if forbids:
     )
 if chosen_mode() == BOTH:
     st.caption(
-        "A rule that demands should be right in at least the minimum confidence, "
-        f"{share_text(chosen_confidence())}. Each rule is tried in all states that it applies to. "
-        "All together are judged as they are used: where a rule that demands applies, those that "
-        "forbid have no say."
+        f"A rule that demands should be right in at least {share_text(chosen_confidence())}, the "
+        "minimum confidence. Each rule is tried in all states that it applies to. All together are "
+        "judged as they are used: where a rule that demands applies, those that forbid have no say."
     )
 if forbids and mined_data() is not None:
     st.info(
