@@ -23,6 +23,7 @@ from sarl_dashboard.state.thresholds import (
     chosen_confidence,
     chosen_epsilon,
     chosen_mode,
+    chosen_thresholds,
 )
 from sarl_dashboard.views.evidence.contradictions import show_contradictions
 from sarl_dashboard.views.evidence.evidence import chosen_evidence
@@ -51,11 +52,13 @@ if chosen_mode() == BOTH:
         "minimum confidence. Each rule is tried in all states that it applies to. All together are "
         "judged as they are used: where a rule that demands applies, those that forbid have no say."
     )
-if forbids and mined_data() is not None:
+mined = mined_data()
+if forbids and mined is not None and mined.held_out and not mined.counted(chosen_thresholds()):
     st.info(
-        "A mined file counts, in the episodes held out, what its rules demand, and not what they "
-        "forbid; choose rules that demand on the page Thresholds, or the demonstrations "
-        "themselves.",
+        "Of more than two actions a mined file counts, in the episodes held out, how often the "
+        "expert did the most frequent one, and not how often it did another that is forbidden; "
+        "choose rules that demand on the page Thresholds, or the demonstrations themselves in the "
+        "sidebar.",
         icon=":material/block:",
     )
     end_page()

@@ -17,7 +17,7 @@ from sarl_dashboard.cache import RESULTS
 from sarl_dashboard.components.run_bar import run_bar
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import rule_base
-from sarl_dashboard.state.data import chosen_demonstrations
+from sarl_dashboard.state.data import chosen_demonstrations, mined_data
 from sarl_dashboard.state.thresholds import chosen_divider
 from sarl_dashboard.text import in_full
 
@@ -38,7 +38,8 @@ def elsewhere_notice(
     if demonstrations is None or not rule_base.at_thresholds():
         return
     if demonstrations.sample_of is not None:
-        if thresholds.never is not None:
+        mined = mined_data()
+        if mined is not None and mined.held_out and not mined.counted(thresholds):
             return
         _notice_of_file(demonstrations, cross_fitting.judged(thresholds), fidelity, more)
         return

@@ -47,13 +47,10 @@ def judged(thresholds: Thresholds) -> Judged | None:
 
     Returns:
         Of mined rules alone: a compact set was built from other states. Of a mined file what the
-        episodes say that were held out when it was mined, and of its rules that forbid nothing:
-        it holds too few counts for those.
+        episodes say that were held out when it was mined, where it holds the counts for that.
     """
     mined = mined_data()
     if mined is not None:
-        if thresholds.never is not None:
-            return None
         return _judged_in_file(mined, thresholds) if rule_base.at_thresholds() else None
     fit = known()
     return None if fit is None else _judged(fit, thresholds)

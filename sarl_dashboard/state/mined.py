@@ -112,19 +112,14 @@ def mined_rules(trees: Trees, thresholds: Thresholds, parts: Parts | None) -> Ru
         InputError: If the trees of a mined file do not reach down to the support.
     """
     mined = mined_data()
-    if mined is not None and mined.trees == trees and thresholds.never is None:
+    if mined is not None and mined.trees == trees:
         return _rules_of_file(mined, thresholds)
     return _mined_rules(trees, thresholds, parts)
 
 
 @cached()
 def _rules_of_file(mined: MinedData, thresholds: Thresholds) -> RuleSet:
-    return mined.mine(
-        supp_min=thresholds.support,
-        conf_min=thresholds.confidence,
-        lift_min=thresholds.lift,
-        max_depth=thresholds.max_depth,
-    )
+    return mined.at(thresholds)
 
 
 @cached()

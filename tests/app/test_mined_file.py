@@ -12,12 +12,15 @@ import pytest
 
 from sarl_core import load_demonstrations, mine_rules
 from sarl_core.demonstrations.formats import read_demonstrations
+from sarl_core.explaining.words.cross_fit import judged_sentence
+from sarl_core.explaining.words.evidence import held_out_text
 from sarl_core.library import Library
 from sarl_core.library.bundles import export_bundle, import_bundle
 from sarl_core.library.contents import data_of, rules_of
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.growing import growth
 from sarl_core.mining.language import share_text
+from sarl_core.mining.never.never_rules import never_thresholds
 from sarl_core.mining.rule_set import RuleSet, rules_to_json
 from sarl_core.mining.rules import Thresholds
 from sarl_dashboard.components.downloads import as_file
@@ -202,6 +205,34 @@ def test_evidence_is_of_the_episodes_that_the_file_counted(mined: MinedFiles) ->
     assert f"{HELD_OUT} episodes of {EPISODES + HELD_OUT} were held out" in texts(app)
     assert "Share of the episodes held out" not in [one.label for one in app.select_slider]
     assert html(app).count("that they were not mined from, the rules are right") == 1
+
+
+@pytest.mark.parametrize("mode", ["forbid", "both"])
+def test_of_two_actions_it_counts_what_rules_forbid(mined: MinedFiles, mode: str) -> None:
+    at = replace(AT, never=0.1) if mode == "both" else never_thresholds(0.1, AT.support)
+    forbidding = address(opened_mined(mined.cartpole), mode=mode, epsilon="0.1")
+    app = open_page("evidence", **forbidding)
+    judged, rules, numbers = mined.data.judged(at), mined.data.at(at), metrics(app)
+    assert judged is not None
+    assert numbers["Rules"] == f"{len(rules):,}"
+    assert numbers["Held-out fidelity"] == share_text(judged.fidelity.share or 0.0, decimals=1)
+    assert judged_sentence(judged) in html(app)
+    assert sorted(app.dataframe[0].value["Held out"]) == sorted(
+        held_out_text(rule.held_out) for rule in rules
+    )
+    assert judged_sentence(judged) in html(open_page("thresholds", **forbidding))
+    with patch.object(MinedData, "counted", return_value=False):  # as of more actions
+        assert "not how often it did another that is forbidden" in texts(
+            open_page("evidence", **forbidding)
+        )
+
+
+def test_rules_that_forbid_of_a_file_with_nothing_held_out(mined: MinedFiles) -> None:
+    identifier = opened_mined(mined.pendulum)
+    app = open_page("evidence", data=identifier, mode="forbid", epsilon="0.1", support="0.01")
+    assert list(metrics(app)) == ["Rules"]
+    assert int(metrics(app)["Rules"]) > 0
+    assert "Nothing was held out when these steps were mined" in texts(app)
 
 
 def test_other_names_change_no_count(mined: MinedFiles) -> None:

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
-from sarl_core.mining.algorithm_1 import mine_rules
+from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.editing.renaming import renamed_trees
 from sarl_core.mining.evidence import DataBox, EpisodeCounts, HeldOut
+from sarl_core.mining.never.never_rules import forbidding_nodes, mine_at
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.tree import PolicyTree
@@ -136,6 +137,14 @@ class MinedData:
     def _of_nodes(self) -> tuple[list[HeldOut], ...]:
         return tuple(counts.held_out() for counts in self.held_out)
 
+    @cached_property
+    def _of_nodes_reversed(self) -> tuple[list[HeldOut], ...]:
+        """The same where all labels but the most frequent one are right."""
+        return tuple(
+            replace(counts, correct=counts.samples - counts.correct).held_out()
+            for counts in self.held_out
+        )
+
     def mine(
         self,
         *,
@@ -159,25 +168,47 @@ class MinedData:
             InputError: If a threshold is out of range, or the trees were not grown down to the
                 support.
         """
-        if 0.0 <= supp_min < self.min_support:
+        return self.at(Thresholds(supp_min, conf_min, lift_min, max_depth))
+
+    def at(self, thresholds: Thresholds) -> RuleSet:
+        """Mine rules that demand, that forbid, or both, with data boxes and held-out episodes.
+
+        Args:
+            thresholds: At which the trees are cut.
+
+        Returns:
+            The rules, without held-out episodes where those were not `counted`.
+
+        Raises:
+            InputError: If the trees were not grown down to the support.
+        """
+        if thresholds.support < self.min_support:
             raise InputError(
-                f"the minimum support is {supp_min:g}, and these trees were grown down to "
-                f"{self.min_support:g}; give that or more, or mine the steps again with less"
+                f"the minimum support is {thresholds.support:g}, and these trees were grown down "
+                f"to {self.min_support:g}; give that or more, or mine the steps again with less"
             )
-        rules = mine_rules(
-            self.trees,
-            supp_min=supp_min,
-            conf_min=conf_min,
-            lift_min=lift_min,
-            max_depth=max_depth,
+        rules, counted = mine_at(self.trees, thresholds), self.counted(thresholds)
+        return replace(
+            rules, rules=tuple(self._completed(rule, counted=counted) for rule in rules.rules)
         )
-        return replace(rules, rules=tuple(map(self._completed, rules.rules)))
+
+    def counted(self, thresholds: Thresholds) -> bool:
+        """Whether what was counted in held-out episodes says how often rules are right.
+
+        At each node it is the label that is most frequent there, and all others together: of two
+        labels that is both, of more not the one that a rule forbids.
+
+        Args:
+            thresholds: Of the rules.
+        """
+        two = all(tree.dimension.n_labels <= 2 for tree in self.trees)
+        return bool(self.held_out) and (thresholds.never is None or two)
 
     def count_rules(self, rule_set: RuleSet) -> EpisodeCounts:
         """What was counted of rules in the episodes that were held out.
 
         Args:
-            rule_set: Of `mine`, or some rules of one.
+            rule_set: Of `at`, or some rules of one, of which these were `counted`.
 
         Returns:
             The counts, a rule's place in the set being its number.
@@ -188,12 +219,10 @@ class MinedData:
             counts = self.held_out[rule.dimension]
             ends = np.searchsorted(counts.subject, [node_of(rule), node_of(rule) + 1])
             of = slice(*ends.tolist())
-            episode = counts.episode[of]
-            columns.append(
-                np.stack(
-                    [np.full_like(episode, number), episode, counts.samples[of], counts.correct[of]]
-                )
-            )
+            episode, samples, correct = counts.episode[of], counts.samples[of], counts.correct[of]
+            if self._forbids_most_frequent(rule):
+                correct = samples - correct
+            columns.append(np.stack([np.full_like(episode, number), episode, samples, correct]))
         whole = np.concatenate(columns, axis=1) if columns else np.zeros((4, 0), dtype=np.int64)
         place, episode, samples, correct = whole
         return EpisodeCounts(
@@ -201,19 +230,109 @@ class MinedData:
         )
 
     def judged(self, thresholds: Thresholds) -> Judged | None:
-        """What the held-out episodes say of all rules at thresholds; None where there are none.
+        """What the held-out episodes say of all rules at thresholds; None if not `counted`.
 
         Args:
             thresholds: At which the trees are cut.
         """
-        return Fold(self.trees, self.held_out).at(thresholds) if self.held_out else None
+        if not self.counted(thresholds):
+            return None
+        if thresholds.never is None:
+            return Fold(self.trees, self.held_out).at(thresholds)
+        first = self.held_out[0]
+        covered, correct = np.zeros((2, len(first.numbers)), dtype=np.int64)
+        for tree, counts in zip(self.trees, self.held_out, strict=True):
+            some, right = _together(tree, counts, thresholds)
+            covered, correct = covered + some, correct + right
+        decisions = first.lengths * len(self.trees)
+        return Judged(first.numbers, first.lengths, decisions, covered, correct)
 
-    def _completed(self, rule: Rule) -> Rule:
+    def _completed(self, rule: Rule, *, counted: bool) -> Rule:
         node = node_of(rule)
         sides = self.boxes[rule.dimension][:, node]
         box = None if np.isnan(sides).any() else DataBox(*sides.tolist())
-        held = self._of_nodes[rule.dimension][node] if self.held_out else None
-        return replace(rule, box=box, held_out=held)
+        if not counted:
+            return replace(rule, box=box)
+        of = self._of_nodes_reversed if self._forbids_most_frequent(rule) else self._of_nodes
+        return replace(rule, box=box, held_out=of[rule.dimension][node])
+
+    def _forbids_most_frequent(self, rule: Rule) -> bool:
+        return int(self.trees[rule.dimension].label[node_of(rule)]) in rule.forbids
+
+
+def _together(
+    tree: PolicyTree, counts: EpisodeCounts, thresholds: Thresholds
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """What was counted at the nodes of a tree with two labels, of all its rules together.
+
+    Where a rule begins to have a say on a path, other labels are right from there on: what that
+    changes is added up over the nodes, so that each pair counts as the last of them says.
+
+    Args:
+        tree: With n nodes.
+        counts: At these, in E episodes.
+        thresholds: Of rules that forbid, alone or behind those that demand.
+
+    Returns:
+        Pairs of each episode to which a rule applies, and those of them that are right, (E,) each.
+    """
+    right, says = _right_labels(tree, thresholds)
+    change, begins = right.astype(np.int64), says.astype(np.int64)
+    below = np.flatnonzero(tree.parent >= 0)
+    above = tree.parent[below]
+    change[below] -= right[above]
+    begins[below] -= says[above]
+    at = counts.subject
+    most = tree.label[at]
+    weights = (
+        begins[at] * counts.samples,
+        change[at, most] * counts.correct
+        + change[at, most - 1] * (counts.samples - counts.correct),
+    )
+    covered, correct = (
+        np.bincount(counts.episode, weight, minlength=len(counts.numbers)) for weight in weights
+    )
+    return covered.astype(np.int64), correct.astype(np.int64)
+
+
+def _right_labels(
+    tree: PolicyTree, thresholds: Thresholds
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which labels the rules on the way to each node leave right, and whether any has a say.
+
+    Args:
+        tree: With n nodes and L labels.
+        thresholds: Of rules that forbid, alone or behind those that demand.
+
+    Returns:
+        Shapes (n, L), where nothing has a say no label, and (n,).
+    """
+    at, epsilon = thresholds, thresholds.never or 0.0
+    allowed = ~forbidding_nodes(tree, epsilon=epsilon, supp_min=at.support, max_depth=at.max_depth)
+    demands = np.zeros(tree.n_nodes, dtype=np.bool_)
+    if at.demands:
+        demands[
+            cut_nodes(
+                tree,
+                supp_min=at.support,
+                conf_min=at.confidence,
+                lift_min=at.lift,
+                max_depth=at.max_depth,
+            )
+        ] = True
+    allowed[demands] = np.arange(allowed.shape[1]) == tree.label[demands, None]
+    for depth in range(1, int(tree.depth.max()) + 1):
+        nodes = np.flatnonzero(tree.depth == depth)
+        above = tree.parent[nodes]
+        # What forbids is added to what stands above; what demands comes before all of it.
+        allowed[nodes] = np.where(
+            demands[nodes, None],
+            allowed[nodes],
+            allowed[above] & (allowed[nodes] | demands[above, None]),
+        )
+        demands[nodes] |= demands[above]
+    says = demands | ~allowed.all(axis=1)
+    return allowed & says[:, None], says
 
 
 def node_of(rule: Rule) -> int:

@@ -80,16 +80,13 @@ def _findings(evidence: RuleSetEvidence) -> Findings:
     ordered = replace(rule_set, rules=rules)
     if evidence.mined is not None:
         counts = evidence.mined.count_rules(ordered)
+        judged = evidence.mined.judged(rule_set.thresholds)
     else:
         assert held_out is not None
         counts = count_rules(ordered, held_out)
+        judged = judge_pairs(rule_set, held_out) if rule_set.forbids else judge(rule_set, counts)
     influences = tuple(
         most_influential(*counts.of(place), counts.numbers, counts.lengths)
         for place in range(len(rules))
-    )
-    judged = (
-        judge_pairs(rule_set, held_out)
-        if rule_set.forbids and held_out is not None
-        else judge(rule_set, counts)
     )
     return Findings(rules, missing, judged, influences)

@@ -17,12 +17,14 @@ from sarl_core.mining.combining.choice import with_combinations
 from sarl_core.mining.distributed import mining
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.editing.regrowing import next_queries
+from sarl_core.mining.never.never_rules import mine_at, never_thresholds
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.pareto import pareto_front
 from sarl_core.mining.tree import Source
 from sarl_core.mining.validation.contradictions import find_contradictions
-from sarl_core.mining.validation.cross_fitting import cross_fit, judge
-from sarl_core.mining.validation.holding_out import hold_out
+from sarl_core.mining.validation.cross_fitting import cross_fit, judge, judge_pairs
+from sarl_core.mining.validation.episode_counts import count_rules
+from sarl_core.mining.validation.holding_out import count_held_out, hold_out, with_held_out
 from tests.mining.distributed.conftest import Mine, cut
 
 LEAST = 0.005
@@ -87,6 +89,52 @@ def test_all_rules_are_judged_as_each_is_counted(mined: MinedData) -> None:
         assert judged.fidelity == counted.fidelity
         assert judged.coverage == counted.coverage
     assert replace(mined, held_out=()).judged(Thresholds(0.01, 0.8)) is None
+
+
+def with_counts(labels: int, *, dimensions: int) -> tuple[MinedData, Demonstrations]:
+    """What a cluster would leave of noisy steps, and those that it holds out."""
+    rng = np.random.default_rng(labels)
+    states = rng.normal(size=(2_000, 3)).astype(np.float32)
+    actions = (states[:, :dimensions] > 0).astype(np.int64) * (labels - 1)
+    noisy = rng.random(actions.shape) < 0.2
+    actions[noisy] = rng.integers(0, labels, noisy.sum())
+    split = hold_out(Demonstrations(states, actions, np.repeat(np.arange(20), 100)), 0.4)
+    trees = grow_policy_trees(split.mined)
+    boxes = tuple(np.full((4, tree.n_nodes, 3), np.nan) for tree in trees)
+    counts = count_held_out(trees, split.held_out)
+    return MinedData(trees, split.mined, boxes, (), counts, 0.4), split.held_out
+
+
+@pytest.mark.parametrize("epsilon", [0.15, 0.4, 0.7])
+@pytest.mark.parametrize("demands", [False, True])
+@pytest.mark.parametrize("dimensions", [1, 2])
+def test_of_two_labels_its_counts_are_those_of_the_steps_for_rules_that_forbid(
+    epsilon: float, demands: bool, dimensions: int
+) -> None:
+    mined, held_out = with_counts(2, dimensions=dimensions)
+    for support in (0.0, 0.02):
+        at = Thresholds(support, 0.85, never=epsilon) if demands else None
+        at = at or never_thresholds(epsilon, support, 6)
+        rules, steps = mined.at(at), with_held_out(mine_at(mined.trees, at), held_out)
+        assert rules.forbids
+        assert [rule.held_out for rule in rules] == [rule.held_out for rule in steps]
+        judged, counted = mined.judged(at), judge_pairs(steps, held_out)
+        assert judged is not None
+        for name in ("numbers", "lengths", "decisions", "covered", "correct"):
+            np.testing.assert_array_equal(getattr(judged, name), getattr(counted, name))
+        counts, other = mined.count_rules(rules), count_rules(steps, held_out)
+        for name in ("subject", "episode", "samples", "correct"):
+            np.testing.assert_array_equal(getattr(counts, name), getattr(other, name))
+
+
+def test_of_more_labels_its_counts_do_not_say_how_often_one_was_done() -> None:
+    mined, _ = with_counts(3, dimensions=1)
+    never = never_thresholds(0.2, 0.02)
+    assert mined.counted(Thresholds(0.02, 0.8))
+    assert not mined.counted(never)
+    assert mined.judged(never) is None
+    assert len(mined.at(never))
+    assert {rule.held_out for rule in mined.at(never)} == {None}
 
 
 def test_no_trade_off_is_promised_below_what_was_grown(mined: MinedData) -> None:
