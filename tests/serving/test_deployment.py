@@ -37,6 +37,18 @@ def test_the_container_is_built_from_what_there_is() -> None:
     assert [name for name in names if f"!{name}\n" not in left_in] == []
 
 
+def test_what_is_put_aside_lies_on_disk_and_not_in_memory() -> None:
+    container = (DEPLOYMENT / "Containerfile").read_text()
+    folder = re.findall(r"\bTMPDIR=(\S+)", container)[0]
+    assert folder in re.findall(r"^VOLUME (.*)$", container, re.MULTILINE)[0].split()
+    assert f'"find {folder} -mindepth 1 -delete; exec sarl app"' in container
+    compose = (DEPLOYMENT / "compose.yaml").read_text()
+    assert re.search(rf"^      - {folder}(\s|$)", compose, re.MULTILINE)
+    in_memory = re.findall(r"^    tmpfs: (/[^:\s]+)", compose, re.MULTILINE)
+    assert in_memory
+    assert folder not in in_memory
+
+
 def test_the_secrets_to_fill_in_are_all_that_signing_in_needs() -> None:
     secrets = tomllib.loads((DEPLOYMENT / "secrets.example.toml").read_text())
     assert set(secrets["auth"]) == {
