@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import errno
 import threading
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import Demonstrations
+from sarl_dashboard.views.demonstrations import stored_files
 from sarl_dashboard.views.demonstrations import upload as view
 from tests.app.screens import ROUTER, errors, metrics, open_page, page_file, texts
 from tests.app.test_demonstrations_page import upload
@@ -158,3 +161,16 @@ def test_the_session_holds_no_content_of_a_file_whose_name_stands_there() -> Non
     job = app.session_state["_job_reading"]
     app.run()
     assert app.session_state["_job_reading"] is job
+
+
+def test_where_the_disk_is_full_an_upload_stays_in_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full() -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(stored_files, "tempfile", SimpleNamespace(TemporaryFile=full))
+    app = finished(upload(open_page("demonstrations"), ("mine.csv", csv_bytes(*ROWS))))
+    assert not app.exception
+    assert not errors(app)
+    assert metrics(app)["Steps"] == "5"
+    (stored,) = app.session_state["_stored_files"].values()
+    assert bytes(stored.getvalue()) == csv_bytes(*ROWS)
