@@ -43,13 +43,15 @@ class EndedJob:
     """Work that has come to its end.
 
     Attributes:
-        author: Who began it.
+        visitor: Who began it, as `session.visitor` tells visitors apart.
+        author: The same, by name.
         page: Title of the page where it was begun.
         address: Of that page, as it was then.
         ended: Seconds of `time.time`.
         error: Why it ended early; "" if it did not.
     """
 
+    visitor: str
     author: str
     page: str
     address: str
@@ -132,7 +134,8 @@ class JobQueue:
             said = {"page": job.page, "author": job.author, "seconds": seconds, "error": error}
             _LOGGER.info("job cancelled" if job.cancelled else "job ended", extra=said)
             if not job.cancelled:
-                self._ended.append(EndedJob(job.author, job.page, job.address, time.time(), error))
+                began = job.visitor, job.author, job.page, job.address
+                self._ended.append(EndedJob(*began, time.time(), error))
 
 
 @cache

@@ -12,6 +12,8 @@ from streamlit.web.server.starlette.starlette_app_utils import generate_xsrf_tok
 from sarl_core.serving.limits import VARIABLE, ServerLimits
 from sarl_dashboard import session
 from sarl_dashboard.components.journey import sign_in
+from sarl_dashboard.jobs.queue import JobQueue
+from sarl_dashboard.views.library import at_work
 
 VERIFIED = {"email_verified": True}
 
@@ -76,11 +78,23 @@ def test_an_address_that_nobody_verified_makes_nobody_its_holder(
 def test_of_an_account_that_is_called_otherwise_work_stays_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    visitors = []
+    visitors, listed = [], []
+    jobs = JobQueue()
+    monkeypatch.setattr(at_work, "queue", lambda: jobs)
     for sub, name in (("1", "Ada Byron"), ("1", "Ada Lovelace"), ("2", "Ada Lovelace")):
-        name_of(monkeypatch, iss="https://login.example.org", sub=sub, name=name)
+        author = name_of(monkeypatch, iss="https://login.example.org", sub=sub, name=name)
         visitors.append(session.visitor())
+        if not jobs.waiting:
+            begun: Any = SimpleNamespace(
+                **{"visitor": visitors[0], "author": author, "cancelled": False, "error": None},
+                **{"page": "Measure", "address": "measure?data=cartpole", "began": 0.0},
+            )
+            jobs.enter(begun)
+            jobs.leave(begun)
+            jobs.enter(begun)
+        listed.append((len(at_work._of(author)), len(at_work._ended(author))))
     assert visitors[0] == visitors[1] != visitors[2]
+    assert listed == [(1, 1), (1, 1), (0, 0)]
 
 
 def test_who_comes_back_from_signing_in_sees_what_was_wanted_once(

@@ -9,6 +9,7 @@ from typing import Any
 import streamlit as st
 
 from sarl_core.mining.language import counted
+from sarl_dashboard import session
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.jobs.queue import EndedJob, queue
 from sarl_dashboard.text import escaped, in_full
@@ -46,16 +47,18 @@ def show_work(author: str) -> None:
 
 
 def _of(author: str) -> list[Job[Any]]:
-    return [
-        job
-        for job in (*queue().running, *queue().waiting)
-        if job.author == author and not job.cancelled
-    ]
+    jobs = (*queue().running, *queue().waiting)
+    return [job for job in jobs if _is_of(job, author) and not job.cancelled]
 
 
 def _ended(author: str) -> list[EndedJob]:
     since = time.time() - _LISTED_FOR
-    return [one for one in queue().ended if one.author == author and one.ended > since][:_LISTED]
+    return [one for one in queue().ended if _is_of(one, author) and one.ended > since][:_LISTED]
+
+
+def _is_of(work: Job[Any] | EndedJob, author: str) -> bool:
+    """Whether work is a visitor's: by the account, whatever it is called by now, or by name."""
+    return work.visitor == session.visitor() or work.author == author
 
 
 def _line(job: Job[Any]) -> None:
