@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 from sarl_core import Demonstrations, InputError, WorkError, load_demonstrations, mine_rules
+from sarl_core.explaining.report import pdf
 from sarl_core.explaining.report.comparison import read_results
 from sarl_core.explaining.report.cover import Cover, logo_of, read_logo
 from sarl_core.explaining.report.outcomes import pairs_of
@@ -244,3 +245,26 @@ def test_without_a_browser_a_pdf_is_refused_and_nothing_is_written(
         report.save(tmp_path / "report.pdf")
     assert "write .html" in str(caught.value)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("does", "patience", "said"),
+    [
+        ("exec sleep 60", 0.1, "was not done after 0.1 seconds; try again when this machine"),
+        ("exit 3", 60.0, "ended with code 3; make room"),
+        ("exit 0", 60.0, "ended and wrote nothing; make room"),
+    ],
+)
+def test_a_browser_that_does_not_print_is_not_told_to_be_missing(
+    does: str, patience: float, said: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    browser = tmp_path / "browser"
+    browser.write_text(f"#!/bin/sh\n{does}\n")
+    browser.chmod(0o700)
+    monkeypatch.setenv("BROWSER_PATH", str(browser))
+    monkeypatch.setattr(pdf, "_PATIENCE", patience)
+    with pytest.raises(WorkError) as refused:
+        document_to_pdf("<!doctype html><title>x</title>")
+    assert said in str(refused.value)
+    assert str(refused.value).endswith("or write .html and print it from a browser")
+    assert "install" not in str(refused.value)

@@ -8,6 +8,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from sarl_core.errors import WorkError, quoted
 from sarl_core.explaining.figures.png import without_browser
 from sarl_core.progress import Progress, report
 
@@ -15,6 +16,7 @@ _PATIENCE = 180  # seconds; of large reports with many pictures a slow machine n
 _LOOKED_EVERY = 0.25  # seconds
 _WHAT = "the PDF could not be printed"
 _ADVICE = "write .html and print it from a browser"
+_ROOM = "make room in memory and in the folder for temporary files and try again"
 
 
 def document_to_pdf(html: str, progress: Progress | None = None) -> bytes:
@@ -29,7 +31,7 @@ def document_to_pdf(html: str, progress: Progress | None = None) -> bytes:
         A PDF file.
 
     Raises:
-        WorkError: If there is no Chromium or Chrome to print it with.
+        WorkError: If there is no Chromium or Chrome to print it with, or it did not print it.
         CancelledError: If the caller wants no more.
     """
     try:
@@ -39,7 +41,7 @@ def document_to_pdf(html: str, progress: Progress | None = None) -> bytes:
         if browser is None:
             raise FileNotFoundError
         return _printed(browser, html, progress)
-    except (ImportError, OSError, subprocess.SubprocessError) as error:
+    except (ImportError, OSError) as error:
         raise without_browser(error, _WHAT, _ADVICE) from error
 
 
@@ -56,7 +58,11 @@ def can_print() -> bool:
 def _printed(browser: str, html: str, progress: Progress | None) -> bytes:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         page, printed = Path(folder, "report.html"), Path(folder, "report.pdf")
-        page.write_text(html, encoding="utf-8", newline="\n")
+        try:
+            page.write_text(html, encoding="utf-8", newline="\n")
+        except OSError as error:
+            why = error.strerror or error
+            raise WorkError(f"{_WHAT}: {page} cannot be written ({why}); {_ROOM}") from error
         # Without its sandbox, as pictures are drawn: root has none. The page runs no script and
         # fetches nothing.
         arguments = (
@@ -68,12 +74,19 @@ def _printed(browser: str, html: str, progress: Progress | None) -> bytes:
             f"--print-to-pdf={printed}",
             page.as_uri(),
         )
-        _run([browser, *arguments], progress)
+        code = _run([browser, *arguments], progress)
+        if code or not printed.is_file():
+            ended = f"ended with code {code}" if code else "ended and wrote nothing"
+            raise WorkError(f"{_WHAT}: {quoted(browser)} {ended}; {_ROOM}, or {_ADVICE}")
         return printed.read_bytes()
 
 
-def _run(command: list[str], progress: Progress | None) -> None:
-    """Run a program to its end, which is its own or the caller's."""
+def _run(command: list[str], progress: Progress | None) -> int:
+    """Run a program to its end, which is its own or the caller's.
+
+    Returns:
+        The code with which it ended.
+    """
     began = time.monotonic()
     quiet = subprocess.DEVNULL
     with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet) as process:
@@ -81,11 +94,13 @@ def _run(command: list[str], progress: Progress | None) -> None:
             while process.poll() is None:
                 seconds = time.monotonic() - began
                 if seconds > _PATIENCE:
-                    raise subprocess.TimeoutExpired(command, _PATIENCE)
+                    raise WorkError(
+                        f"{_WHAT}: the browser was not done after {_PATIENCE:g} seconds; try "
+                        f"again when this machine is less busy, or {_ADVICE}"
+                    )
                 report(progress, int(seconds), _PATIENCE)
                 with suppress(subprocess.TimeoutExpired):
                     process.wait(_LOOKED_EVERY)
         finally:
             process.kill()  # nothing, where it has ended; its own processes go with it
-    if process.returncode:
-        raise subprocess.CalledProcessError(process.returncode, command)
+    return process.returncode
