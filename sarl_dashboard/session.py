@@ -41,6 +41,7 @@ def settle(page: str, modules: int) -> None:
 # --- whose it is --------------------------------------------------------------------------------
 
 _LONGEST_NAME = 200  # as the library has it
+_LONGEST_ADDRESS = _LONGEST_NAME - 4  # in brackets, behind a letter of a name and a space
 _ONLY_ONE = "the only one"
 
 
@@ -64,8 +65,9 @@ def signed_in() -> str:
     if get_script_run_ctx() is None or not is_signed_in():
         return ""
     name, email = _said("name"), _said("email")
-    if email and str(st.user.get("email_verified")).lower() == "true":  # a text with some
-        return _with_mark(name, f"<{email}>") if name else email[:_LONGEST_NAME]
+    verified = str(st.user.get("email_verified")).lower() == "true"  # a text with some
+    if email and verified and len(email) <= _LONGEST_ADDRESS:  # cut, it could be somebody else's
+        return _with_mark(name, f"<{email}>") if name else email
     named = (name or email).replace("@", " at ")  # or it could be somebody's address
     account = _account()
     if not (named and account):

@@ -75,6 +75,20 @@ def test_an_address_that_nobody_verified_makes_nobody_its_holder(
     assert name_of(monkeypatch, **eve, name="Bob") == ""  # as nobody can tell which
 
 
+@pytest.mark.parametrize("name", ["", "Ada", "Ada Lovelace" * 30])
+def test_no_name_is_longer_than_things_can_be_kept_under(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    names = set()
+    for length in (20, 150, 196, 197, 254):
+        email = f"ada@{'x' * (length - 8)}.org"
+        author = name_of(monkeypatch, name=name, email=email, sub=str(length), **VERIFIED)
+        assert 0 < len(author) <= 200
+        assert (email in author) == (length <= 196)  # never a part of one, which others may share
+        names.add(author)
+    assert len(names) == 5
+
+
 def test_of_an_account_that_is_called_otherwise_work_stays_its_own(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
