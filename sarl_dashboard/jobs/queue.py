@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import time
 from collections import Counter, deque
 from collections.abc import Sequence
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 _LOGGER = logging.getLogger(__name__)
 MOST_WAITING = 20  # of one visitor; each is a thread
 _MOST_ENDED = 100  # that are remembered, of all visitors
+_MARK = re.compile(r" (<[^<>]*>|\(account \w+\))$")  # behind a name, as `session.signed_in` has it
+_ADDRESS = re.compile(r"@| at \S+\.")
 _KNOWN_FROM = 0.03  # share of some work from which on the rest can be guessed
 
 
@@ -257,7 +260,13 @@ def _whose(jobs: Sequence[Job[Any]], job: Job[Any]) -> str:
         if other.visitor == job.visitor
         else "others"
         if other.author == job.author
-        else other.author
+        else _name_alone(other.author)
         for other in jobs
     )
     return ", ".join(f"{number} of {name}" for name, number in names.items())
+
+
+def _name_alone(author: str) -> str:
+    """What strangers are told of who somebody is: no address and no account."""
+    name = _MARK.sub("", author)
+    return "others" if _ADDRESS.search(name) else name

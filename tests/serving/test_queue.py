@@ -72,6 +72,23 @@ def test_visitors_of_one_author_are_others_to_each_other() -> None:
     assert "(2 of others, 1 of yours)" in said
 
 
+@pytest.mark.parametrize(
+    ("author", "shown"),
+    [
+        ("Ada <ada@example.org>", "Ada"),
+        ("Ada Lovelace (account 3f9a1c20b7d4)", "Ada Lovelace"),
+        ("ada@example.org", "others"),
+        ("ada@home <ada@example.org>", "others"),
+        ("ada at example.org (account 3f9a1c20b7d4)", "others"),
+    ],
+)
+def test_who_waits_is_not_told_addresses_of_others(author: str, shown: str) -> None:
+    queue = JobQueue()
+    begun(queue, work("one", author=author), work("Bob"), work("Cy"))
+    (said,) = begun(queue, work("Dot"))
+    assert f"3 jobs go on (1 of {shown}, 1 of Bob, 1 of Cy), as many" in said
+
+
 def test_who_runs_less_comes_first() -> None:
     queue = JobQueue()
     running = [work("Ada"), work("Bob"), work("Cy")]
