@@ -268,6 +268,16 @@ def test_edits_are_counted_on_the_sample_and_say_so(mined: MinedFiles) -> None:
     assert f"The states of this page are of {PART}." in texts(app)
 
 
+@pytest.mark.parametrize(("mode", "of_sample"), [("forbid", False), ("both", True)])
+def test_what_both_kinds_of_rules_come_to_is_of_the_sample_and_says_so(
+    mined: MinedFiles, mode: str, of_sample: bool
+) -> None:
+    app = open_page("thresholds", **address(opened_mined(mined.cartpole), mode=mode))
+    assert not app.exception
+    assert "Freedom" in metrics(app)
+    assert (f"Coverage, fidelity and freedom are of {PART}." in texts(app)) == of_sample
+
+
 @pytest.mark.parametrize(
     ("page", "about", "what"),
     [

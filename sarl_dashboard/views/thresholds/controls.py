@@ -21,10 +21,12 @@ from sarl_core.mining.thresholds.steps import (
     with_step,
 )
 from sarl_dashboard.components.elsewhere import elsewhere_notice
+from sarl_dashboard.components.journey.steps_needed import say_of_sample
 from sarl_dashboard.components.journey.words import with_words, word_help
 from sarl_dashboard.components.places import placed
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.state import rule_base
+from sarl_dashboard.state.data import chosen_demonstrations
 from sarl_dashboard.state.rule_files import (
     COMBINED,
     COMPACT,
@@ -108,6 +110,7 @@ def show_controls(
         leave_compact if not rule_base.at_thresholds() else "rerun" if alone else follow
     )
     jumps = None if display.forbids else neat_jumps(display.trees, thresholds)
+    both = thresholds.never is not None and thresholds.demands
     left, middle, right = st.columns([4, 4, 3])
     with left:
         st.select_slider(
@@ -154,7 +157,7 @@ def show_controls(
                 on_change=leave_compact,
                 help=word_help("divider"),
             )
-        if thresholds.never is not None and thresholds.demands:
+        if both:
             epsilon_slider(moved)
         elif not display.forbids:
             named_settings(thresholds, rule_base.compact_name() if display.compact else None)
@@ -166,6 +169,9 @@ def show_controls(
         cross_fitting.judged(thresholds) if everything else None,
         display.trees[0] if display.compact is None else None,
     )
+    demonstrations = chosen_demonstrations()
+    if both and display.compact is None and demonstrations is not None:
+        say_of_sample("Coverage, fidelity and freedom", demonstrations)
     if everything:
         elsewhere_notice(thresholds, float(point.fidelity[0, 0]))
     if thresholds.never is None:
