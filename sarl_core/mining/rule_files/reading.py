@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated, Any, Generic, Literal, TypeVar
@@ -33,7 +33,7 @@ from sarl_core.errors import InputError, quoted
 from sarl_core.mining.evidence import DataBox, HeldOut
 from sarl_core.mining.labels import MAX_DIVIDER, LabelledDimension
 from sarl_core.mining.rule_contents import RuleContents
-from sarl_core.mining.rule_files.writing import FORMAT, VERSIONS
+from sarl_core.mining.rule_files.writing import FORMAT, VERSIONS, usually_demands
 from sarl_core.mining.rules import Condition, Kind, Operator, Origin, Rule, Thresholds
 from sarl_core.mining.tree import Learner, Source
 
@@ -194,6 +194,13 @@ class _Thresholds(DocumentPart):
     lift: NotNegative = 0.0
     max_depth: Count | None = None
     never: Annotated[float, Meta(gt=0.0, lt=1.0)] | None = None
+    demands: bool | None = None
+
+    def read(self, kinds: Set[Kind]) -> Thresholds:
+        if self.never is None and self.demands is not None:
+            raise MisfitError("'demands' stands beside 'never' alone", "thresholds")
+        demands = usually_demands(self.never, kinds) if self.demands is None else self.demands
+        return Thresholds(**asdict(self) | {"demands": demands})
 
 
 class _Demonstrations(DocumentPart):
@@ -402,11 +409,7 @@ class _Document(DocumentPart, Generic[_Held]):
             rules,
             actions,
             Source(self.env_id, features, mined.digest, mined.steps, mined.episodes),
-            Thresholds(
-                **asdict(self.thresholds),
-                demands=self.thresholds.never is None
-                or any(one.kind == "do" for one in self.rules),
-            ),
+            self.thresholds.read({rule.kind for rule in rules}),
             self.divider,
             self.cut,
             self.learner,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from sarl_core.demonstrations.derived import Combination
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_contents import RuleContents
-from sarl_core.mining.rules import Condition, Rule
+from sarl_core.mining.rules import Condition, Kind, Rule
 
 FORMAT = "sarl-rules"
 VERSIONS = (1, 2)
@@ -125,7 +125,7 @@ def _document(rule_set: RuleContents) -> dict[str, Any]:
             "confidence": _number(thresholds.confidence),
             "lift": _number(thresholds.lift),
             "max_depth": thresholds.max_depth,
-            **({} if thresholds.never is None else {"never": _number(thresholds.never)}),
+            **_never(rule_set),
         },
         "divider": rule_set.divider,
         # Where it is the paper's cut, the file is what it was before there was another.
@@ -138,6 +138,25 @@ def _document(rule_set: RuleContents) -> dict[str, Any]:
         },
         "rules": map(rule_document, rule_set.rules),
     }
+
+
+def _never(rule_set: RuleContents) -> dict[str, Any]:
+    """What thresholds say of rules that forbid, and of others beside them where that is unusual."""
+    at = rule_set.thresholds
+    if at.never is None:
+        return {}
+    usual = usually_demands(at.never, {rule.kind for rule in rule_set.rules})
+    return {"never": _number(at.never)} | ({} if at.demands == usual else {"demands": at.demands})
+
+
+def usually_demands(never: float | None, kinds: Set[Kind]) -> bool:
+    """Whether rules are mined that demand, where a file does not say: where there is one.
+
+    Args:
+        never: Epsilon of rules that forbid; None where none are mined.
+        kinds: Of the rules in the file.
+    """
+    return never is None or "do" in kinds
 
 
 def _needs_version_2(rule_set: RuleContents) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -148,12 +149,36 @@ def test_a_file_gives_back_what_was_written(tmp_path):
     for rules in (
         mine_never_rules(engines(), epsilon=0.05, supp_min=0.1),
         with_never_rules(mine_rules(trees, supp_min=0.1, conf_min=0.45), trees, 0.05),
+        with_never_rules(mine_rules(trees, supp_min=0.1, conf_min=1.0), trees, 0.05),  # none
     ):
         rules.save(tmp_path / "rules.json")
         again = RuleSet.load(tmp_path / "rules.json")
         assert again.rules == rules.rules
         assert again.thresholds == rules.thresholds
         assert again.digest == rules.digest
+
+
+def test_whether_rules_demand_is_written_where_they_do_not_say_it():
+    trees = grow_policy_trees(engines())
+    alone = mine_never_rules(engines(), epsilon=0.05, supp_min=0.1)
+    none = with_never_rules(mine_rules(trees, supp_min=0.1, conf_min=1.0), trees, 0.05)
+    some = with_never_rules(mine_rules(trees, supp_min=0.1, conf_min=0.45), trees, 0.05)
+    mixed = replace(alone, rules=(*alone.rules, some.rules[0]))  # as when one is added by hand
+    assert not any(rule.kind == "do" for rule in none.rules)
+    for rules, written in ((alone, None), (some, None), (none, True), (mixed, False)):
+        document = json.loads(rules_to_json(rules))
+        assert document["thresholds"].get("demands") == written
+        assert rules_from_json(json.dumps(document)).thresholds == rules.thresholds
+        document["thresholds"].pop("demands", None)  # as before it was written
+        before = rules_from_json(json.dumps(document)).thresholds
+        assert before.demands == (rules.thresholds.demands if written is None else not written)
+
+
+def test_whether_rules_demand_is_refused_where_none_forbid():
+    document = json.loads(rules_to_json(mine_rules(engines(), supp_min=0.1, conf_min=0.45)))
+    document["thresholds"]["demands"] = False
+    with pytest.raises(InputError, match="'demands' stands beside 'never' alone in thresholds"):
+        rules_from_json(json.dumps(document))
 
 
 def test_a_never_rule_forbids_in_the_place_of_an_action():
