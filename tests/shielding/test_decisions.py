@@ -364,3 +364,8 @@ def test_edits_of_rules_that_forbid_are_counted_as_the_shield_decides() -> None:
 def test_what_nobody_can_forbid_is_refused(forbids: tuple[int, ...], problem: str) -> None:
     with pytest.raises(InputError, match=problem):
         manual_rule(FINE, [], rule_id="manual.1", action=None, forbids=forbids)
+
+
+def test_a_rule_says_what_to_do_or_what_not_to_do() -> None:
+    with pytest.raises(InputError, match=r"what to do .* and what not to do; choose one of them"):
+        manual_rule(FINE, [], rule_id="manual.1", action=1, forbids=(0,))

@@ -51,7 +51,7 @@ def manual_rule(
             any, the rule applies always.
         rule_id: Its name.
         action: The label, None while none is chosen.
-        forbids: In its place, the labels that it forbids.
+        forbids: In its place, the labels that it forbids; then the action is None.
         dimension: Action dimension it speaks of.
         demonstrations: What it is counted on. They are left alone where the rule set was mined
             from others, because the shares of one set are of the same pairs.
@@ -62,7 +62,7 @@ def manual_rule(
 
     Raises:
         InputError: If a condition is wrong, the conditions contradict each other, no action is
-            chosen, or another rule asks and says the same.
+            chosen or one beside what is forbidden, or another rule asks and says the same.
     """
     if not 0 <= dimension < len(rule_set.actions):
         raise InputError(
@@ -70,6 +70,10 @@ def manual_rule(
         )
     conditions = _conditions(rule_set, asks)
     forbidden = tuple(sorted(set(forbids)))
+    if forbidden and action is not None:
+        raise InputError(
+            f"the rule says both what to do (label {action}) and what not to do; choose one of them"
+        )
     speaks_of = forbidden if action is None else (action,)
     if not speaks_of:
         raise InputError("the rule has no action; choose what it says")
