@@ -294,11 +294,11 @@ def _most_alike(
 
 def _says(*rule_sets: RuleSet) -> list[NDArray[np.int64]]:
     """What each rule demands or forbids, as a number that is the same wherever it is the same."""
-    numbers: dict[tuple[int, bool, int], int] = {}
+    numbers: dict[tuple[int, int | tuple[int, ...]], int] = {}
     return [
         np.array(
             [
-                numbers.setdefault((rule.dimension, bool(rule.forbids), rule.label), len(numbers))
+                numbers.setdefault((rule.dimension, rule.forbids or rule.action), len(numbers))
                 for rule in rule_set.rules
             ],
             dtype=np.int64,

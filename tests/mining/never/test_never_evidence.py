@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -112,6 +113,10 @@ def test_a_learning_curve_is_of_rules_that_forbid_where_there_is_an_epsilon(land
 
 def test_rules_that_forbid_come_back_as_those_that_forbid_the_same(lander_like: Demonstrations):
     rules = mine_never_rules(lander_like, epsilon=0.2, supp_min=0.05)
+    first = next(rule for rule in rules if rule.label < rule.instead[0])
+    more, *left = first.instead  # as one made by hand forbids several: none forbids the same
+    several = {"forbids": (first.label, more), "instead": tuple(left), "action": left[0]}
+    rules = replace(rules, rules=(*rules.rules, replace(first, id="manual.1", **several)))
     stable = rule_stability(rules, lander_like, rounds=2, seed=1)
     rng = np.random.default_rng(1)
     episodes = np.unique(lander_like.episodes)
