@@ -98,6 +98,7 @@ def take_click(key: str, trees: tuple[PolicyTree, ...]) -> None:
         support, other = float(values[0]), float(values[1])
         if key == "pareto":
             use_point(support, other, trees)
+            return
         name = "epsilon" if chosen_mode() == FORBID else "confidence"
         st.session_state["_clicked"] = {"support": max(support, least_support()), name: other}
     if clicked_cell := st.session_state.get("_clicked"):
