@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from streamlit.testing.v1 import AppTest
 
-from sarl_core import RuleSet, Shield, load_demonstrations
+from sarl_core import Demonstrations, RuleSet, Shield, load_demonstrations
 from sarl_core.explaining.colours import chip_colour, label_colour
 from sarl_core.mining.never.never_rules import mine_never_rules
 from sarl_core.mining.rule_set import rules_to_json
@@ -129,3 +130,33 @@ def test_the_states_of_an_episode_are_as_the_shield_has_them(mined: RuleSet) -> 
     covered = np.mean(rules >= 0)
     assert covered == 1.0
     assert "Some rule applies in 100 % of them" in texts(opened("episodes", mined))
+
+
+def what_a_rule_says() -> None:
+    """The part of the form on Edit that asks for it."""
+    import streamlit as st
+
+    from sarl_dashboard.views.edit import form
+
+    form._says(form.Draft(), st.session_state["rules"])
+
+
+@pytest.mark.parametrize("says", [(0, 2), 2])
+def test_what_the_form_says_goes_with_the_action_that_knows_it(
+    says: int | tuple[int, ...],
+) -> None:
+    rng = np.random.default_rng(0)
+    states = rng.uniform(-1, 1, (400, 1)).astype(np.float32)
+    actions = np.stack([rng.integers(0, 3, 400), (states[:, 0] > 0).astype(int)], axis=1)
+    rules = mine_never_rules(Demonstrations(states, actions, np.zeros(400)), epsilon=0.1)
+    several = replace(
+        rules.rules[0], id="manual.1", dimension=0, forbids=(0, 2), instead=(1,), action=1
+    )
+    app = AppTest.from_function(what_a_rule_says)
+    app.session_state["rules"] = replace(rules, rules=(several, *rules.rules))
+    app.session_state["draft0_action"] = says
+    assert app.run().selectbox(key="draft0_action").value == says
+    for dimension in (1, 0):  # the other has two labels, and no rule that forbids both
+        app.selectbox(key="draft0_dimension").set_value(dimension).run()
+        assert not app.exception, app.exception
+        assert app.selectbox(key="draft0_action").value is None
