@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -65,3 +66,16 @@ def test_a_certificate_of_other_rules_is_refused_and_left_out_of_a_card(rules: R
     assert certificates_part(rules, [], card).tables == ()
     for damaged in (None, {}, {"certificate": 3}, {"certificate": {"format": "sarl-certificate"}}):
         assert certificates_part(rules, [], damaged).tables == ()
+
+
+def test_only_a_certificate_that_holds_says_that_a_limit_is_certified(rules: RuleSet) -> None:
+    held = of_card("cartpole_compact")
+    part = certificates_part(rules, [held], None)
+    assert part.holds_for(None)
+    assert part.holds_for(held.subject.agent)
+    assert not part.holds_for("somebody else")
+    for outcome in (False, None):
+        verdict = replace(held.verdict, certified=outcome)
+        refused = certificates_part(rules, [replace(held, verdict=verdict)], None)
+        assert refused.verdicts
+        assert not refused.holds_for(None)

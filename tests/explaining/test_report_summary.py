@@ -15,7 +15,7 @@ from PIL import Image
 
 from sarl_core import Demonstrations, InputError, WorkError, load_demonstrations, mine_rules
 from sarl_core.explaining.report import pdf
-from sarl_core.explaining.report.comparison import read_results
+from sarl_core.explaining.report.comparison import Result, read_results
 from sarl_core.explaining.report.cover import Cover, logo_of, read_logo
 from sarl_core.explaining.report.outcomes import pairs_of
 from sarl_core.explaining.report.pdf import document_to_pdf
@@ -101,12 +101,29 @@ def test_rules_that_decide_every_step_are_no_shield_and_shown_once(cart: Demonst
     assert apart.count("<svg") == 2 * 4
 
 
-def test_what_is_borne_is_decided_by_what_was_tried_most_often(cart: Demonstrations) -> None:
+def test_what_is_borne_is_asked_of_each_who_is_to_act(cart: Demonstrations) -> None:
+    alone, novice, expert, shielded = read_results(CSV)
+    calm = dataclasses.replace(shielded, episodes=200, crashes=0.0, crash_ends=(0.0, 0.018))
+    again = dataclasses.replace(novice, name="a second test", crash_ends=(0.8, 0.92))
     reports = {"mean": 480.0, "episodes": 3000, "failures": 90}
     card = {"reported": reports | {"failure_low": 0.024, "failure_high": 0.037}}
-    page = first_page(reported(cart, comparison=read_results(CSV), card=card))
-    assert "up to 3.7\N{NO-BREAK SPACE}% of the episodes fail?" in page
-    assert "what 3,000 episodes tell" in page
+
+    def borne(*results: Result) -> list[str]:
+        page = first_page(reported(cart, comparison=results, card=card))
+        rows = [row for row in page.replace("\N{NO-BREAK SPACE}", " ").split("<strong>")]
+        return [row.split("</th>")[0] for row in rows if row.startswith("Can it be borne")]
+
+    first, second = borne(alone, novice, expert, calm, again)
+    assert "up to 92 % of the episodes fail when the novice acts under the rules?" in first
+    assert "of 100 episodes (“a second test”), the worst of its 2 tests." in first
+    assert "up to 1.8 % of the episodes fail when the expert acts under the rules?" in second
+    assert "of 200 episodes (“expert, filtered”). No limit is certified of it." in second
+    (ruled,) = borne(*(dataclasses.replace(one, freedom=0.0) for one in (calm, shielded)))
+    assert "up to 64 % of the episodes fail when the rules act?" in ruled
+    assert "the worst of its 3 tests" in ruled
+    (unmeasured,) = borne()
+    assert "up to 3.7 % of the episodes fail when an agent follows the rules?" in unmeasured
+    assert "of 3,000 episodes (on the card of the rules)." in unmeasured
 
 
 def test_features_that_no_rule_asks_about_are_named(cart: Demonstrations) -> None:

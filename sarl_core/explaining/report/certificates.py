@@ -26,12 +26,25 @@ class CertificatesPart:
     Attributes:
         tables: Of each certificate names and values, the verdict first.
         verdicts: What each has shown of whom, in sentences.
+        certified: The agents of whom one holds, by name.
         limits: What none of them says.
     """
 
     tables: tuple[tuple[tuple[str, str], ...], ...]
     verdicts: tuple[str, ...]
+    certified: frozenset[str]
     limits: str = LIMITS
+
+    def holds_for(self, agent: str | None) -> bool:
+        """Whether a limit of failures is certified.
+
+        Args:
+            agent: Of this agent under the rules; of any where None, as the rules act for all alike.
+
+        Returns:
+            False where a test was refused or came to no end.
+        """
+        return bool(self.certified) if agent is None else agent in self.certified
 
 
 def certificates_part(
@@ -65,6 +78,7 @@ def certificates_part(
     return CertificatesPart(
         tuple(_table(one) for one in every),
         tuple(f"{verdict_text(one)} Tested was {subject_text(one.subject)}." for one in every),
+        frozenset(one.subject.agent for one in every if one.verdict.certified),
     )
 
 

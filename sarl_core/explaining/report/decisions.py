@@ -11,6 +11,7 @@ from sarl_core.explaining.report.comparison import HARMS, Result, is_known
 from sarl_core.explaining.report.gaps import Doubt, UncoveredSummary
 from sarl_core.explaining.report.outcomes import (
     MOST_PAIRS,
+    FailureLimit,
     Pair,
     failures_at_most,
     failures_share,
@@ -65,13 +66,9 @@ def decisions(
             "What they do to whoever is held to them is not known.",
         )
     yield from (_of_pair(pair) for pair in pairs[:MOST_PAIRS])
-    worst = failures_at_most(pairs, reported)
-    if worst is not None and not certified.verdicts:
-        yield OpenQuestion(
-            f"Can it be borne that up to {share_text(worst[0])} of the episodes fail?",
-            f"It is the upper end of what {counted(worst[1], 'episode')} tell; where there are two "
-            "tests, of the worse. No limit is certified.",
-        )
+    for limit in failures_at_most(pairs, reported):
+        if not certified.holds_for(limit.agent):
+            yield _borne(limit)
     if counts.coverage < 1.0:
         yield OpenQuestion(
             "Is it enough that the rules leave the other states alone?",
@@ -107,6 +104,16 @@ def _of_pair(pair: Pair) -> OpenQuestion:
     effect = effects.get(one.effect, "What they change is not known")
     against = "" if alone is None else f", against {_numbers(alone)} without them"
     return OpenQuestion(question, f"{effect}: {_numbers(one)}{against}.")
+
+
+def _borne(limit: FailureLimit) -> OpenQuestion:
+    worst = f", the worst of its {limit.tests} tests" if limit.tests > 1 else ""
+    return OpenQuestion(
+        f"Can it be borne that up to {share_text(limit.share)} of the episodes fail when "
+        f"{limit.acting}?",
+        f"It is the upper end of the 95 % interval of {counted(limit.episodes, 'episode')} "
+        f"({limit.test}){worst}. No limit is certified of it.",
+    )
 
 
 def _named(doubt: Doubt) -> str:

@@ -27,6 +27,7 @@ from sarl_core.rollouts.statistics import MeanInterval, mean_interval_of
 MOST_PAIRS = 2  # as many fit on the first page; all stand in the comparison itself
 _MOST_ROWS = 4
 _RULES = "the rules, whoever acts"
+_FOLLOWING = "an agent follows the rules"
 _WHO = {"novice": "which acts at random", "untrained": "a network that has learned nothing"}
 
 
@@ -70,6 +71,27 @@ class OutcomeRow:
     failures_text: str
     mean: Markup
     mean_text: str
+
+
+@dataclass(frozen=True)
+class FailureLimit:
+    """How many of the episodes may fail of one who is to act.
+
+    Attributes:
+        agent: Its name; "" where it is not known, None where the rules decide in its place.
+        acting: As "the novice acts under the rules".
+        share: The upper end of the 95 % interval of the worst of its tests.
+        episodes: Of that test.
+        test: Which one that is.
+        tests: How many there are.
+    """
+
+    agent: str | None
+    acting: str
+    share: float
+    episodes: int
+    test: str
+    tests: int
 
 
 def agent_text(result: Result) -> str:
@@ -363,25 +385,37 @@ def _intervals(pair: Pair) -> Iterator[str]:
         yield f"mean return with the rules less that of {pair.agent} alone {ends[0]} to {ends[1]}"
 
 
-def failures_at_most(pairs: Sequence[Pair], reported: ReportedEpisodes) -> tuple[float, int] | None:
-    """How many episodes may fail under the rules, by whatever was tried most often.
+def failures_at_most(pairs: Sequence[Pair], reported: ReportedEpisodes) -> tuple[FailureLimit, ...]:
+    """How many episodes may fail of whoever is to act, by the worst of its tests.
 
     Args:
         pairs: Of the results.
-        reported: What the card of the rules says.
+        reported: What the card of the rules says of an agent that follows them, and so of nobody
+            who is left a choice.
 
     Returns:
-        The upper end of the 95 % interval and the number of its episodes; None where no such end
-        is known.
+        One entry for each who is to act, of the agents on the first page and in their order, where
+        an upper end is known. Rules that leave no choice are one, whoever they act for.
     """
-    ends = [
-        (one.episodes, one.crash_ends[1])
-        for one in (pair.shielded for pair in pairs)
-        if is_known(one) and one.crash_ends is not None
-    ]
-    if reported.rate is not None:
-        ends.append((reported.rate.of, reported.rate.high))
-    if not ends:
-        return None
-    most = max(episodes for episodes, _ in ends)
-    return max(high for episodes, high in ends if episodes == most), most
+    actors = dict.fromkeys(_actor(pair) for pair in pairs[:MOST_PAIRS]) or {(None, _FOLLOWING): 0}
+    limits = []
+    for agent, acting in actors:
+        own = [pair.shielded for pair in pairs if _actor(pair) == (agent, acting)]
+        tests = [
+            (one.crash_ends[1], one.episodes, f"“{one.name}”")
+            for one in own
+            if is_known(one) and one.crash_ends is not None
+        ]
+        if agent is None and reported.rate is not None:
+            tests.append((reported.rate.high, reported.rate.of, "on the card of the rules"))
+        if tests:
+            high, episodes, test = max(tests, key=lambda one: one[0])
+            limits.append(FailureLimit(agent, acting, high, episodes, test, len(tests)))
+    return tuple(limits)
+
+
+def _actor(pair: Pair) -> tuple[str | None, str]:
+    """Who is to act, None where the rules do; and in words."""
+    if pair.is_policy:
+        return None, "the rules act"
+    return pair.shielded.agent, f"{pair.agent} acts under the rules"
