@@ -12,6 +12,7 @@ import pytest
 
 from sarl_core import Demonstrations, RuleSet, load_demonstrations, mine_rules
 from sarl_core.explaining.report.report import make_report
+from sarl_core.explaining.report.slides import slides_document
 from sarl_core.explaining.report.tally import tally
 from sarl_core.mining.rules import Condition, Rule
 from sarl_core.mining.validation.holding_out import hold_out, with_held_out
@@ -116,3 +117,41 @@ def test_what_an_interval_counts_is_said(cart: Demonstrations, rules: RuleSet) -
     told = words_of(make_report(rules, cart, **PLAIN).html)
     assert "each of them counts once, however long it is" in told
     assert "Wilson" not in told
+
+
+def test_the_first_page_begins_with_what_applies_most_often_whoever_placed_it(
+    cart: Demonstrations, rules: RuleSet
+) -> None:
+    seldom = min(rules.rules, key=lambda rule: rule.support)
+    pinned = dataclasses.replace(seldom, pinned=True)
+    others = (rule for rule in edited(rules).rules if rule.id != seldom.id)
+    placed = dataclasses.replace(rules, rules=(pinned, *others))
+    report = make_report(placed, cart, in_full=2, **PLAIN)
+    names = [rule.name for rule in report.parts["rules"].first]
+    hand, *by_support = sorted(
+        (rule for rule in placed.rules if rule.enabled),
+        key=lambda rule: rule.samples or len(cart),
+        reverse=True,
+    )
+    assert hand.origin == "manual"  # it is counted on half of the states
+    assert names[: len(by_support) + 1] == [placed.name_of(one) for one in (hand, *by_support)]
+    assert placed.name_of(seldom) == names[-2]
+    told = words_of(report.html)
+    assert "2 are shown in full, first those that a person placed and then" in told
+    assert "apply most often in the states" in told
+
+
+@pytest.mark.parametrize("in_full", [0, 1, 60])
+def test_slides_list_the_rules_whatever_is_shown_in_full(
+    cart: Demonstrations, rules: RuleSet, in_full: int
+) -> None:
+    report = make_report(rules, cart, in_full=in_full, **PLAIN)
+    slide = words_of(report.slides.split("<section")[3])
+    assert "There is none" not in slide
+    assert "other" not in slide
+    assert all(f" {rules.name_of(rule)} " in slide for rule in rules.rules)
+    many = dataclasses.replace(rules, rules=rules.rules * 2)
+    parts = report.parts | {"rules": dataclasses.replace(report.parts["rules"], count=len(many))}
+    slide = words_of(slides_document(parts).split("<section")[3])
+    assert f"The other {len(many) - len(rules)} rules stand in the report." in slide
+    assert ("1 rule follows on a slide of its own." in slide) == (in_full == 1)

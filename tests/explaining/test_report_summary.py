@@ -110,7 +110,7 @@ def test_what_is_borne_is_asked_of_each_who_is_to_act(cart: Demonstrations) -> N
 
     def borne(*results: Result) -> list[str]:
         page = first_page(reported(cart, comparison=results, card=card))
-        rows = [row for row in page.replace("\N{NO-BREAK SPACE}", " ").split("<strong>")]
+        rows = page.replace("\N{NO-BREAK SPACE}", " ").split("<strong>")
         return [row.split("</th>")[0] for row in rows if row.startswith("Can it be borne")]
 
     first, second = borne(alone, novice, expert, calm, again)

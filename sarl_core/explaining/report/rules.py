@@ -14,13 +14,31 @@ from sarl_core.explaining.report.rule_cards import Card, rule_card, tags
 from sarl_core.explaining.report.rule_set_card import RuleSetCard
 from sarl_core.explaining.report.tally import Tally
 from sarl_core.mining.action_words import says_text
-from sarl_core.mining.language import conditions_text, share_text
+from sarl_core.mining.language import conditions_text, sentence, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.rendering.example_frames import Examples
 
 MOST_IN_TABLE = 5_000
+_MOST_FIRST = 8  # on one slide
 _PRINTED_LINES = 150  # of the table; the file itself holds all
+
+
+@dataclass(frozen=True)
+class ShortRule:
+    """A rule in one line.
+
+    Attributes:
+        name: As "R12", by its place in the rule file.
+        title: The rule as a sentence.
+        colour: Of its action.
+        tags: As "switched off".
+    """
+
+    name: str
+    title: str
+    colour: str
+    tags: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -66,6 +84,8 @@ class Rules:
     """The rules.
 
     Attributes:
+        count: How many there are.
+        first: Those that apply most often, whichever action they speak of and whoever placed them.
         introduction: What is shown how, in sentences.
         beneath: What stands under each rule, as a sentence.
         headings: Of the columns for what a rule says and what the expert did.
@@ -75,6 +95,8 @@ class Rules:
         left_out: Number of rules that are not even in the table.
     """
 
+    count: int
+    first: tuple[ShortRule, ...]
     introduction: tuple[str, ...]
     beneath: str
     headings: tuple[str, str]
@@ -148,6 +170,8 @@ def rules_part(
             groups.append(Group(action.name if len(rule_set.actions) > 1 else "", cards))
     lines = tuple(_line(rule_set, index) for index in rest[:MOST_IN_TABLE])
     return Rules(
+        count=len(rule_set.rules),
+        first=_first(rule_set, demonstrations),
         introduction=(
             *_introduction(rule_set, demonstrations, tally, card, len(full), len(rest)),
             *_on_combinations(rule_set, full),
@@ -158,6 +182,27 @@ def rules_part(
         lines=lines,
         printed=_PRINTED_LINES,
         left_out=max(len(rest) - MOST_IN_TABLE, 0),
+    )
+
+
+def _first(rule_set: RuleSet, demonstrations: Demonstrations) -> tuple[ShortRule, ...]:
+    """The rules in force by support, and after them those that are switched off."""
+
+    def support(rule: Rule) -> float:
+        if rule.samples or rule.origin != "manual":
+            return rule.support
+        # It was written where there was nothing to count it on.
+        return float(rule.applies(demonstrations.observations).mean())
+
+    rules = sorted(rule_set.rules, key=lambda rule: (not rule.enabled, -support(rule)))
+    return tuple(
+        ShortRule(
+            name=rule_set.name_of(rule),
+            title=sentence(rule, rule_set, evidence=False),
+            colour=label_colour(rule.label),
+            tags=tags(rule),
+        )
+        for rule in rules[:_MOST_FIRST]
     )
 
 
@@ -237,14 +282,27 @@ def _introduction(
         applying += " A rule that is switched off decides nothing."
     sentences = [f"Of several conditions in a rule all must hold. {applying}"]
     if rest:
-        each = ", as many of each action," if len(rule_set.actions) > 1 else ""
-        sentences.append(
-            f"There are {len(rule_set.rules):,} rules. The {full:,} that apply most often{each} "
-            f"are shown in full, the other {rest:,} in a table after them."
-        )
+        sentences.append(_division(rule_set, full, rest))
     if not tally.same:
         sentences.append(origin_text(rule_set, demonstrations, tally, card))
     return tuple(sentences)
+
+
+def _division(rule_set: RuleSet, full: int, rest: int) -> str:
+    """Which rules are shown in full and which in a table, as a sentence."""
+    if not full:
+        return f"There {'is 1 rule' if rest == 1 else f'are {rest:,} rules'}, in a table."
+    each = ", as many of each action," if len(rule_set.actions) > 1 else ""
+    which = f"The {full:,} that apply most often{each} are shown in full"
+    if any(rule.placed for rule in rule_set.rules):
+        which = (
+            f"{full:,}{each} are shown in full, first those that a person placed and then those "
+            "that apply most often"
+        )
+    return (
+        f"There are {len(rule_set.rules):,} rules. {which}; the other {rest:,} stand in a table "
+        "after them."
+    )
 
 
 def _line(rule_set: RuleSet, index: int) -> RuleLine:
