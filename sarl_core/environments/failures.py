@@ -164,20 +164,21 @@ def failure_text(environment: EnvironmentOrId) -> str:
     return "an end that is no time limit" if meaning == _EVERY_END else ""
 
 
-def failure_meaning(env_id: str) -> str:
+def failure_meaning(env_id: str, failure: str) -> str:
     """When an episode fails, for who knows only the task.
 
     Args:
         env_id: Environment.
+        failure: What a failure was in it, as `failure_text` has it.
 
     Returns:
-        As "the lander crashes or leaves the field", or else as "it comes to an end that is no time
-        limit"; "" where it is not known, or there is none.
+        As "the lander crashes or leaves the field" where that is what is known of the environment,
+        or else as "it comes to a step at which speed > 9 is true"; "" where `failure` is.
     """
-    if own := _MEANINGS.get(_family(env_id)):
+    own = _MEANINGS.get(_family(env_id))
+    if own and failure == failure_text(env_id):
         return own
-    text = failure_text(env_id) if env_id else ""
-    return f"it comes to {text}" if text else ""
+    return f"it comes to {failure}" if failure else ""
 
 
 def _end_of_failure(env_id: str) -> str | float | None:

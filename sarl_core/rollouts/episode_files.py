@@ -49,6 +49,7 @@ class _EpisodesDocument(Struct, forbid_unknown_fields=True):
     flips: list[_Whole] | None = None
     invalid: list[_Whole] | None = None
     signalled: list[float | None] | None = None
+    failure: str = ""
 
 
 def episodes_to_json(episodes: Episodes) -> str:
@@ -68,6 +69,7 @@ def episodes_to_json(episodes: Episodes) -> str:
         "env_id": episodes.env_id,
         "agent": episodes.agent,
         "notes": list(episodes.notes),
+        "failure": episodes.failure,
         **columns,
     }
     return json.dumps(document, allow_nan=False)
@@ -98,4 +100,10 @@ def episodes_from_json(text: str | bytes, *, name: str) -> Episodes:
         if len(values) != len(document.seeds):
             raise InputError(f"{name} has columns of different lengths; run the episodes again")
         columns[column] = np.array([np.nan if one is None else one for one in values], dtype=kind)
-    return Episodes(document.env_id, document.agent, notes=tuple(document.notes), **columns)
+    return Episodes(
+        document.env_id,
+        document.agent,
+        notes=tuple(document.notes),
+        failure=document.failure,
+        **columns,
+    )

@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 from sarl_core.agents.agent import Agent, EpisodicAgent
 from sarl_core.arrays import make_read_only
 from sarl_core.environments.environment import EnvironmentOrId
-from sarl_core.environments.failures import ends_tell, failed
+from sarl_core.environments.failures import ends_tell, failed, failure_text
 from sarl_core.errors import SarlError, require_whole
 from sarl_core.mining.language import share_text
 from sarl_core.notebooks import table_html
 from sarl_core.processes import completed, executor_of, workers_of
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.failures import safety_facts
-from sarl_core.rollouts.player import EpisodeFaultError, Observer, play
+from sarl_core.rollouts.player import EpisodeArrays, EpisodeFaultError, Observer, play
 from sarl_core.rollouts.statistics import (
     MeanInterval,
     Rate,
@@ -88,6 +88,7 @@ class Episodes:
         notes: What is to be said of how rules and environment were matched, as clauses.
         signalled: 1 where some step was a failure, 0 where none was, NaN where that cannot be
             said, (E,); None where the ends of the episodes tell, or nothing does.
+        failure: What a failure was in them, in words; "" where that is not known.
     """
 
     env_id: str
@@ -110,6 +111,7 @@ class Episodes:
     notes: tuple[str, ...] = ()
     invalid: NDArray[np.int64] | None = None
     signalled: NDArray[np.float64] | None = None
+    failure: str = ""
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
@@ -325,6 +327,7 @@ class Episodes:
             "summary": self.summary(),
             "notes": list(self.remarks),
             "environment": self.env_id,
+            **({"failure": self.failure} if self.failure else {}),
         }
 
     def to_frame(self) -> pd.DataFrame:
@@ -353,7 +356,8 @@ class Episodes:
 _COLUMNS = tuple(
     column.name
     for column in fields(Episodes)
-    if column.name not in ("env_id", "agent", "steps", "flips", "notes", "invalid", "signalled")
+    if column.name
+    not in ("env_id", "agent", "steps", "flips", "notes", "invalid", "signalled", "failure")
 )
 
 
@@ -534,8 +538,7 @@ def finished_before(
     if played is None or not count:
         return None
     seeds = np.arange(seed, seed + len(played.lengths), dtype=np.int64)
-    whole = Episodes(env_id=str(env_id), agent=agent.name, seeds=seeds, **played._asdict())
-    return whole.part(0, count)
+    return _played(env_id, agent, seeds, played).part(0, count)
 
 
 def run_seeds(
@@ -583,4 +586,16 @@ def run_seeds(
         observer=observer,
         render_mode=render_mode,
     )
-    return Episodes(env_id=str(env_id), agent=agent.name, seeds=seeds, **outcome._asdict())
+    return _played(env_id, agent, seeds, outcome)
+
+
+def _played(
+    env_id: EnvironmentOrId, agent: Agent, seeds: NDArray[np.int64], outcome: EpisodeArrays
+) -> Episodes:
+    return Episodes(
+        env_id=str(env_id),
+        agent=agent.name,
+        seeds=seeds,
+        failure=failure_text(env_id),
+        **outcome._asdict(),
+    )

@@ -209,7 +209,8 @@ def comparison_row(arm: Arm, episodes: Episodes, alone: Episodes | None = None) 
     Returns:
         `arm`, `agent`, `rules` (their number, None without a shield), `episodes`, the statistics
         of `Episodes.summary` (without a shield, `intervention_rate`, `coverage` and
-        `outside_rate` are None), `crash_rate`, None where it is not known, and of `ShieldEffect`
+        `outside_rate` are None), `crash_rate` and, in words, `failure`, what one is, None where
+        they are not known, and of `ShieldEffect`
         `return_difference`, `difference_low`, `difference_high`, `return_p`, `failure_p` and
         `effect`, None where the episodes without a shield are not given.
     """
@@ -221,6 +222,7 @@ def comparison_row(arm: Arm, episodes: Episodes, alone: Episodes | None = None) 
         "episodes": len(episodes),
         **episodes.summary(),
         "crash_rate": None if episodes.failures is None else episodes.failures.rate,
+        "failure": episodes.failure or None,
     }
     if arm.rules is None:
         row |= {"intervention_rate": None, "coverage": None, "outside_rate": None}

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from sarl_core import InputError, load_demonstrations, mine_rules
+from sarl_core.environments.environment import Environment
 from sarl_core.explaining.report.comparison import (
     ResultFile,
     compared,
@@ -16,6 +17,9 @@ from sarl_core.explaining.report.comparison import (
     results_from_text,
     results_of,
 )
+from sarl_core.explaining.report.outcomes import outcomes_note
+from sarl_core.rollouts.episode_files import episodes_from_json, episodes_to_json
+from sarl_core.rollouts.episodes import rollout
 from sarl_core.studies.comparison import Arm, Comparison, compare
 
 DATA = Path(__file__).parents[2] / "data"
@@ -62,6 +66,22 @@ def test_the_document_of_evaluate_is_one_result(comparison: Comparison) -> None:
         assert (one.covered is not None) == ruled
 
 
+def test_what_a_failure_was_is_said_as_the_file_tells(comparison: Comparison) -> None:
+    known, other = results_of(comparison)
+    assert "It fails if the pole falls or the cart leaves its track." in outcomes_note([known])
+    of_somebody = Environment("CartPole-v1", failure="abs(pole_angle) > 0.1")
+    played = rollout(of_somebody, "novice", episodes=2, keep_steps=False)
+    (read,) = results_from_text(json.dumps(played.to_dict()), "novice.json")
+    own = "it comes to a step at which abs(pole_angle) > 0.1 is true."
+    assert f"It fails if {own}" in outcomes_note([read])
+    assert "fails if" not in outcomes_note([replace(read, failure="")])
+    both = outcomes_note([read, other])
+    assert f"In “novice” it fails if {own}" in both
+    assert f"In “{other.name}” it fails if the pole falls" in both
+    again = episodes_from_json(episodes_to_json(played), name="episodes")
+    assert again.failure == played.failure == read.failure
+
+
 def test_without_results_there_is_nothing_to_show() -> None:
     assert compared(()) is None
 
@@ -89,7 +109,7 @@ def test_what_is_no_comparison_is_refused(text: str, name: str, words: str) -> N
 
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"nowhere\.csv"):
+    with pytest.raises(InputError, match=r"nowhere\.csv.* page Measure"):
         read_results(tmp_path / "nowhere.csv")
     path = tmp_path / "r.csv"
     path.write_bytes(b"\xff\xfe\x00")

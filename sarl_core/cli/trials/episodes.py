@@ -117,6 +117,7 @@ def _summary(played: Episodes, out: Path) -> dict[str, Any]:
         "summary": played.summary(),
         "notes": list(played.remarks),
         "environment": played.env_id,
+        **({"failure": played.failure} if played.failure else {}),
     }
 
 

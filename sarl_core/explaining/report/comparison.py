@@ -86,6 +86,7 @@ class Result:
         effect: What that and the failures mean: helps, harms, or no difference seen; "" where
             unknown.
         agent: Who acted; "" where unknown.
+        failure: What a failure was, in words; "" where unknown.
         file: It was read from; None where it was measured just now.
     """
 
@@ -111,6 +112,7 @@ class Result:
     gained: MeanInterval | None = None
     effect: str = ""
     agent: str = ""
+    failure: str = ""
     file: ResultFile | None = None
 
 
@@ -192,7 +194,7 @@ def read_results(path: Path) -> tuple[Result, ...]:
         reason = error.strerror if isinstance(error, OSError) else "it is no text"
         raise InputError(
             f"the comparison {path} cannot be read ({reason}); give the CSV file of the page "
-            "Shield, or a JSON document of `evaluate --json`"
+            "Measure, or a JSON document of `evaluate --json`"
         ) from error
     return results_from_text(text, path.name)
 
@@ -308,7 +310,7 @@ def _csv_rows(text: str, name: str) -> list[Mapping[str, Any]]:
         if column not in there:
             raise InputError(
                 f"the comparison {name} has no column {column!r}; give the CSV file that the page "
-                "Shield downloads, or a .json document of `evaluate --json`"
+                "Measure downloads, or a .json document of `evaluate --json`"
             )
     return [{key: value or None for key, value in row.items() if key} for row in rows]
 
@@ -337,6 +339,7 @@ def _json_row(text: str, name: str) -> list[Mapping[str, Any]]:
         "environment": document.get("environment"),
         "episodes": len(episodes),
         "seed": first,
+        "failure": document.get("failure"),
         **summary,
     }
     return [row | ({"intervention_rate": None, "coverage": None} if alone else {})]
@@ -371,6 +374,7 @@ class _ResultRow(Struct):
     difference_high: Number | None = None
     effect: Effect | None = None
     agent: str | None = None
+    failure: str | None = None
 
     def read(self) -> Result:
         if not self.iqm_low <= self.iqm <= self.iqm_high:
@@ -398,6 +402,7 @@ class _ResultRow(Struct):
             gained=_gain(self.return_difference, self.difference_low, self.difference_high),
             effect=self.effect or "",
             agent=self.agent or "",
+            failure=self.failure or "",
         )
 
 

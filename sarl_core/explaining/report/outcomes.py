@@ -335,8 +335,17 @@ def outcomes_note(results: Sequence[Result]) -> str:
     Returns:
         Sentences.
     """
-    meanings = {failure_meaning(one.env_id) for one in results if is_known(one)}
-    failing = " ".join(f"It fails if {meaning}." for meaning in sorted(meanings - {""}))
+    names: dict[str, list[str]] = {}
+    for one in results:
+        if is_known(one):
+            names.setdefault(failure_meaning(one.env_id, one.failure), []).append(f"“{one.name}”")
+    failing = " ".join(
+        f"It fails if {meaning}."
+        if len(names) == 1
+        else f"In {' and '.join(of)} it fails if {meaning}."
+        for meaning, of in names.items()
+        if meaning
+    )
     return (
         f"An episode is one attempt from start to end. {failing}{' ' if failing else ''}The return "
         "is the sum of its points: more is better. The lines are 95 % intervals: where the true "
