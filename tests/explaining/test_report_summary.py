@@ -17,9 +17,10 @@ from sarl_core import Demonstrations, InputError, WorkError, load_demonstrations
 from sarl_core.explaining.report import pdf
 from sarl_core.explaining.report.comparison import Result, read_results
 from sarl_core.explaining.report.cover import Cover, logo_of, read_logo
-from sarl_core.explaining.report.outcomes import pairs_of
+from sarl_core.explaining.report.outcomes import certainty, pairs_of
 from sarl_core.explaining.report.pdf import document_to_pdf
 from sarl_core.explaining.report.report import Report, make_report
+from sarl_core.explaining.report.rule_set_card import ReportedEpisodes
 from sarl_core.explaining.report.slides import BESIDE_RULES
 from sarl_core.progress import CancelledError
 
@@ -161,6 +162,25 @@ def test_only_what_is_of_one_agent_on_the_same_seeds_stands_side_by_side() -> No
     nameless = [dataclasses.replace(one, agent="") for one in (alone, shielded)]
     assert pairs_of(nameless)[0].alone == nameless[0]
     assert pairs_of([*nameless, dataclasses.replace(nameless[0], mean=0.0)])[0].alone is None
+
+
+def test_results_of_unknown_seeds_are_not_from_the_same_starts() -> None:
+    alone, shielded, *_ = (dataclasses.replace(one, seed=None) for one in read_results(CSV))
+    assert pairs_of([alone, shielded])[0].alone is None
+
+
+def test_how_many_episodes_a_number_rests_on_is_said_of_every_row() -> None:
+    results = read_results(CSV)
+    pairs = pairs_of(results)
+    (rests, *_) = certainty(pairs, results, ReportedEpisodes())
+    assert rests.startswith("Each number above rests on 100 episodes. 95 % intervals")
+    alone, shielded, *others = results
+    few = [alone, dataclasses.replace(shielded, episodes=3), *others[:1]]
+    (rests, *_) = certainty(pairs_of(few), few, ReportedEpisodes())
+    assert rests.startswith(
+        "The numbers above rest on 3 episodes (novice, filtered) and 100 episodes (the novice "
+        "alone; the expert alone). 95 % intervals"
+    )
 
 
 def test_what_a_person_sets_stands_on_the_first_page_as_text(cart: Demonstrations) -> None:

@@ -19,7 +19,7 @@ from sarl_core.explaining.report.svg import (
     evidence_bar,
 )
 from sarl_core.explaining.words.comparison import POLICY_TEXT
-from sarl_core.mining.language import at_least_text, counted, number_text, share_text
+from sarl_core.mining.language import at_least_text, counted, listed, number_text, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.rollouts.failures import rate_text
 from sarl_core.rollouts.statistics import MeanInterval, mean_interval_of
@@ -114,13 +114,10 @@ def pairs_of(results: Sequence[Result]) -> tuple[Pair, ...]:
     nameless = len(alone) == len(shielded) == 1
 
     def beside(one: Result) -> Result | None:
-        for other in alone:
+        starts = (one.env_id, one.seed, one.episodes)
+        for other in alone if one.seed is not None else ():
             same = other.agent == one.agent and (one.agent or nameless)
-            if same and (other.env_id, other.seed, other.episodes) == (
-                one.env_id,
-                one.seed,
-                one.episodes,
-            ):
+            if same and (other.env_id, other.seed, other.episodes) == starts:
                 return other
         return None
 
@@ -239,10 +236,15 @@ def _effect(pair: Pair) -> str:
     one, alone = pair.shielded, pair.alone
     name = f"With the rules (“{one.name}”)"
     if alone is None:
+        unknown = (
+            "Without them it was not run on the same seeds"
+            if one.seed is not None
+            else "From which seeds is not known"
+        )
         return (
             f"{name} the mean return of {pair.agent} was {telling_text(one.mean)}"
-            f"{_and_failed(one).replace('fail', 'failed')}. Without them it was not run on the "
-            "same seeds, so what they change is not known."
+            f"{_and_failed(one).replace('fail', 'failed')}. {unknown}, so what they change is "
+            "not known."
         )
     who = f", {_WHO[one.agent]}," if one.agent in _WHO else ""
     means = f"was {telling_text(one.mean)} instead of {telling_text(alone.mean)} without them"
@@ -286,6 +288,19 @@ def outcome_rows(pairs: Sequence[Pair], results: Sequence[Result]) -> tuple[Outc
         Rules that decide every step once, and not with each agent that they left nothing to
         choose; all others with the rules and without, and who was only measured without.
     """
+    every = _drawn(pairs, results)
+    if not every:
+        return ()
+    scale = SvgScale.over(
+        [end for _, one in every for end in (_mean(one).low, _mean(one).high)], margin=0.04
+    )
+    return tuple(_outcome(name, one, scale) for name, one in every)
+
+
+def _drawn(pairs: Sequence[Pair], results: Sequence[Result]) -> list[tuple[str, Result]]:
+    """The results that the first page draws, and what they are called there."""
+    if not pairs:
+        return []
     first = pairs[:MOST_PAIRS]
     ruled = _different([pair for pair in first if pair.is_policy])
     rows = [(_RULES if len(ruled) == 1 else one.name, one) for one in ruled]
@@ -293,13 +308,7 @@ def outcome_rows(pairs: Sequence[Pair], results: Sequence[Result]) -> tuple[Outc
         beside = [pair.alone, None if pair.is_policy else pair.shielded]
         rows += [(_name(one), one) for one in beside if one is not None]
     rows += [(_name(one), one) for one in _alone(results)]
-    every = [pair for place, pair in enumerate(rows) if pair not in rows[:place]][:_MOST_ROWS]
-    if not pairs:
-        return ()
-    scale = SvgScale.over(
-        [end for _, one in every for end in (_mean(one).low, _mean(one).high)], margin=0.04
-    )
-    return tuple(_outcome(name, one, scale) for name, one in every)
+    return [row for place, row in enumerate(rows) if row not in rows[:place]][:_MOST_ROWS]
 
 
 def _name(one: Result) -> str:
@@ -356,11 +365,14 @@ def outcomes_note(results: Sequence[Result]) -> str:
 # --- how sure ----------------------------------------------------------------------------------
 
 
-def certainty(pairs: Sequence[Pair], reported: ReportedEpisodes) -> Iterator[str]:
+def certainty(
+    pairs: Sequence[Pair], results: Sequence[Result], reported: ReportedEpisodes
+) -> Iterator[str]:
     """How sure the results are, in sentences.
 
     Args:
-        pairs: Of the results.
+        pairs: `pairs_of` the results.
+        results: Of a comparison.
         reported: What the card of the rules says.
 
     Yields:
@@ -369,11 +381,14 @@ def certainty(pairs: Sequence[Pair], reported: ReportedEpisodes) -> Iterator[str
     first = pairs[:MOST_PAIRS]
     if not first:
         return
-    numbers = sorted({pair.shielded.episodes for pair in pairs})
-    episodes = " or ".join(f"{number:,}" for number in numbers)
-    noun = "episode" if numbers == [1] else "episodes"
+    names: dict[int, list[str]] = {}
+    for name, one in _drawn(pairs, results):
+        names.setdefault(one.episodes, []).append(name)
+    rests = f"Each number above rests on {counted(next(iter(names)), 'episode')}."
+    if len(names) > 1:
+        whose = [f"{counted(of, 'episode')} ({'; '.join(own)})" for of, own in names.items()]
+        rests = f"The numbers above rest on {listed(whose, most=_MOST_ROWS)}."
     intervals = dict.fromkeys(fact for pair in first for fact in _intervals(pair))
-    rests = f"Each number above rests on {episodes} {noun}."
     if not intervals:
         yield f"{rests} Of what the rules change there is no interval."
     else:

@@ -107,7 +107,7 @@ def summary_part(
         outcomes=outcome_rows(pairs, results),
         outcomes_note=outcomes_note(results),
         certainty=(
-            *certainty(pairs, reported),
+            *certainty(pairs, results, reported),
             *certified.verdicts,
             *_match(rule_set, demonstrations, counts, elsewhere),
         ),
