@@ -11,7 +11,11 @@ import numpy as np
 import pytest
 
 from sarl_core import Demonstrations, RuleSet, load_demonstrations, mine_rules
+from sarl_core.explaining.report.certificates import certificates_part
+from sarl_core.explaining.report.decisions import decisions
+from sarl_core.explaining.report.gaps import Doubt, UncoveredSummary
 from sarl_core.explaining.report.report import make_report
+from sarl_core.explaining.report.rule_set_card import ReportedEpisodes
 from sarl_core.explaining.report.slides import slides_document
 from sarl_core.explaining.report.tally import tally
 from sarl_core.mining.rules import Condition, Rule
@@ -103,6 +107,33 @@ def test_the_headline_counts_rules_that_are_on(cart: Demonstrations, rules: Rule
     assert re.search(rf"\b1 rule {merged}\.0 conditions a rule", told)
     assert "A rule that is switched off decides nothing." in told
     assert f"{len(only) - 1} rules were then switched off." in told
+
+
+def test_where_every_rule_is_off_that_is_what_is_said(cart: Demonstrations, rules: RuleSet) -> None:
+    off = tuple(dataclasses.replace(rule, enabled=False) for rule in rules.rules)
+    told = words_of(make_report(dataclasses.replace(rules, rules=off), cart, **PLAIN).html)
+    assert "None of these is in force, so every action passes." in told
+    assert "All 5 rules are switched off." in told
+    assert "Is it right that no rule is in force?" in told
+    for text in ("no rule looks at", "leave the other states alone", "they are right in"):
+        assert text not in told
+
+
+def test_a_question_counts_every_rule_that_deserves_a_second_look(
+    cart: Demonstrations, rules: RuleSet
+) -> None:
+    doubt = Doubt("30 rules are in doubt.", tuple(f"R{place}" for place in range(1, 25)), 6)
+    questions = decisions(
+        (),
+        ReportedEpisodes(),
+        certified=certificates_part(rules, (), None),
+        gaps=UncoveredSummary((), "", (doubt,), (), with_boxes=False),
+        counts=tally(rules, cart),
+        sign_off=None,
+    )
+    assert "30 rules are in doubt (R1, R2, R3, R4 and 26 others)." in [
+        one.reason for one in questions
+    ]
 
 
 def test_rules_tried_on_episodes_kept_aside_stay_so_when_edited(cart: Demonstrations) -> None:

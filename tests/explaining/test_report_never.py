@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -100,5 +101,12 @@ def test_rules_that_demand_and_forbid_stand_in_one_report(landings: Demonstratio
     assert f"{len(both):,} rules in plain language, of which {forbidding:,} forbid" in text
     assert "The expert did so in" in text
     assert "The expert did not in" in text
+    assert "an action that a rule forbids, or that is not the one that a rule demands, is" in text
+    demanding = replace(
+        both, rules=tuple(replace(rule, enabled=not rule.forbids) for rule in both.rules)
+    )
+    text = words(make_report(demanding, landings, frames=0))
+    assert "an action that breaks a rule is replaced by what the rule says" in text
+    assert "of which 0 forbid" not in text
     counts = tally(both, landings)
     assert counts.followed.value == pytest.approx(leeway_of(both, landings).fidelity)

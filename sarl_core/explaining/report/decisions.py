@@ -69,7 +69,11 @@ def decisions(
     for limit in failures_at_most(pairs, reported):
         if not certified.holds_for(limit.agent):
             yield _borne(limit)
-    if counts.coverage < 1.0:
+    if not counts.in_force:
+        yield OpenQuestion(
+            "Is it right that no rule is in force?", "Every action passes, in every state."
+        )
+    elif counts.coverage < 1.0:
         yield OpenQuestion(
             "Is it enough that the rules leave the other states alone?",
             f"In {share_text(1.0 - counts.coverage)} of the demonstrated states no rule applies: "
@@ -118,7 +122,10 @@ def _borne(limit: FailureLimit) -> OpenQuestion:
 
 def _named(doubt: Doubt) -> str:
     """A doubt and whose it is."""
-    return f"{doubt.text.removesuffix('.')} ({listed(doubt.names, most=_MOST_NAMES)})."
+    first = doubt.names[:_MOST_NAMES]
+    others = len(doubt.names) - len(first) + doubt.more
+    names = [*first, *([counted(others, "other")] if others else [])]
+    return f"{doubt.text.removesuffix('.')} ({listed(names, most=len(names))})."
 
 
 def _done_there(gaps: UncoveredSummary) -> str:

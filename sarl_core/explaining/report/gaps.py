@@ -136,7 +136,12 @@ def gaps(
 
 
 def _unused(rule_set: RuleSet) -> str:
-    """Features of the demonstrations that no rule asks about, whether by itself or in a formula."""
+    """Features of the demonstrations that no rule asks about, whether by itself or in a formula.
+
+    "" where no rule is in force.
+    """
+    if not any(rule.enabled for rule in rule_set.rules):
+        return ""
     features = rule_set.source.features
     used: set[int] = set()
     for rule in rule_set.rules:

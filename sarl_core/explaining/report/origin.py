@@ -33,6 +33,10 @@ def demonstrated(
         f"{who} acted{where} for {counted(whole.steps, 'step')} in "
         f"{counted(whole.episodes, 'episode')}."
     )
+    if not counts.in_force:
+        off = len(rule_set.rules)
+        which = "The 1 rule is" if off == 1 else f"All {off:,} rules are"
+        return (acted, f"{which} switched off." if off else "No rule came of it.")
     if counts.leeway is not None:
         return (acted, *_forbidding(rule_set, counts, counts.leeway))
     return (

@@ -450,6 +450,8 @@ def _elsewhere(
     """What the rules are worth where they were not mined, and a warning; "" where not known."""
     if demonstrations.sample_of is not None:
         return "", ""  # episodes that were held out where they were mined stand at each rule
+    if not all(rule.enabled for rule in rule_set.rules):
+        return "", ""  # whoever mines again mines these too
     if len(demonstrations) > _MOST_FITTED or not mined_again(rule_set, trees):
         return "", ""
     divider = rule_set.divider

@@ -37,6 +37,15 @@ _AS_FORBIDDING = (
     "An agent is a program that chooses actions. Used as a shield, rules stand between it and its "
     "task: an action that they forbid is replaced before it is carried out."
 )
+_AS_EITHER = (
+    "An agent is a program that chooses actions. Used as a shield, rules stand between it and its "
+    "task: an action that a rule forbids, or that is not the one that a rule demands, is replaced "
+    "before it is carried out."
+)
+_AS_NOTHING = (
+    "An agent is a program that chooses actions. Used as a shield, rules stand between it and its "
+    "task. None of these is in force, so every action passes."
+)
 _MOST_RANGES = 4
 _AS_POLICY = (
     "These rules name an action in every state that was demonstrated. Whoever is held to them has "
@@ -101,7 +110,7 @@ def summary_part(
     decides = counts.decides
     reported = card.reported_episodes
     return SummaryPart(
-        lead=_AS_POLICY if decides else _AS_FORBIDDING if rule_set.forbids else _AS_SHIELD,
+        lead=_lead(rule_set, counts),
         demonstrated=demonstrated(rule_set, demonstrations, counts, card),
         effects=tuple(effects(rule_set, pairs, results, reported, decides=decides)),
         outcomes=outcome_rows(pairs, results),
@@ -118,6 +127,15 @@ def summary_part(
             )
         ),
     )
+
+
+def _lead(rule_set: RuleSet, counts: Tally) -> str:
+    if counts.decides:
+        return _AS_POLICY
+    kinds = {rule.kind for rule in rule_set.rules if rule.enabled}
+    if len(kinds) > 1:
+        return _AS_EITHER
+    return {"do": _AS_SHIELD, "never": _AS_FORBIDDING}[kinds.pop()] if kinds else _AS_NOTHING
 
 
 def _match(

@@ -52,7 +52,8 @@ class Tally:
         shares: Of each rule, in how many of its states the expert did what it says, or did not
             what it forbids.
         by_episode: The same of each rule, counted by episodes.
-        leeway: What rules leave, where some of them forbid; None where all demand.
+        in_force: Number of rules that are switched on.
+        leeway: What rules leave, where some of those in force forbid; None where all demand.
     """
 
     same: bool
@@ -62,6 +63,7 @@ class Tally:
     labels: NDArray[np.int64]
     shares: tuple[Share, ...]
     by_episode: tuple[HeldOut, ...]
+    in_force: int
     leeway: Leeway | None = None
 
     def covered(self, dimension: int) -> Share:
@@ -166,7 +168,10 @@ def tally(rule_set: RuleSet, demonstrations: Demonstrations) -> Tally:
         labels=labels,
         shares=shares,
         by_episode=tuple(by_episode),
-        leeway=leeway_of(rule_set, demonstrations) if rule_set.forbids else None,
+        in_force=sum(rule.enabled for rule in rule_set.rules),
+        leeway=leeway_of(rule_set, demonstrations)
+        if any(rule.forbids and rule.enabled for rule in rule_set.rules)
+        else None,
     )
 
 
