@@ -205,7 +205,15 @@ def test_the_table_tells_agreement_from_disagreement_by_colour():
     assert rows[1][0].get("style") is None
     same = confusion_html(disagreement(RULES, RULES, STATES), 0, names=("a", "b"))
     assert "Differently" not in same
+    assert "Both say the same everywhere. Grey: both say the same." in same
     assert cells(same)[1] == [["5", "", ""], ["", "", ""], ["", "", "5"]]
+
+
+def test_too_many_choices_for_a_table_are_a_sentence():
+    same = disagreement(RULES, RULES, STATES)
+    text = confusion_html(replace(same, choices=(((0, 1),) * 13,)), 0, names=("a", "b"))
+    assert ">Both say the same everywhere. What the rules leave in these states are 13" in text
+    assert "<table" not in text
 
 
 def test_demonstrations_fit_rules_of_their_features_and_actions():

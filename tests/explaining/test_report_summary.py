@@ -152,6 +152,22 @@ def test_the_first_page_says_what_the_card_of_the_rules_reports(cart: Demonstrat
     assert "had a mean return" not in first_page(reported(cart))
 
 
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"failures": 10},
+        {"cut": 4},
+        {"undecided": 4},
+        {"failure_low": 0.9, "failure_high": 0.1},
+        {"failure_low": 0.5},
+    ],
+)
+def test_a_card_that_contradicts_itself_tells_no_failures(wrong: dict[str, float]) -> None:
+    right = {"episodes": 5, "failures": 2, "failure_low": 0.05, "failure_high": 0.86}
+    assert ReportedEpisodes(**right).rate is not None
+    assert ReportedEpisodes(**(right | wrong)).rate is None
+
+
 def test_only_what_is_of_one_agent_on_the_same_seeds_stands_side_by_side() -> None:
     alone, shielded, *_ = read_results(CSV)
     assert pairs_of([alone, shielded])[0].alone == alone

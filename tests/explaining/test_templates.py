@@ -8,7 +8,7 @@ import jinja2
 import pytest
 from markupsafe import Markup
 
-from sarl_core.explaining.templates import render, style_sheet
+from sarl_core.explaining.templates import render, style_sheet, whole_percents
 
 
 def test_every_text_is_escaped_and_what_is_html_already_is_not() -> None:
@@ -23,6 +23,13 @@ def test_every_text_is_escaped_and_what_is_html_already_is_not() -> None:
 def test_what_a_template_asks_for_and_does_not_get_is_an_error() -> None:
     with pytest.raises(jinja2.UndefinedError, match="text"):
         render("parts/note")
+
+
+def test_percents_are_whole_but_not_in_commands() -> None:
+    command = "<pre>sarl report --title '5 % less'\nsarl</pre><script>a = 5 % b</script>"
+    assert whole_percents(Markup(f"<p>5 %</p>{command}<p>6 %</p>")) == (
+        f"<p>5\N{NO-BREAK SPACE}%</p>{command}<p>6\N{NO-BREAK SPACE}%</p>"
+    )
 
 
 def test_the_style_stays_when_the_page_is_cleaned() -> None:

@@ -84,6 +84,6 @@ def _caption(disagreement: Disagreement, dimension: int, names: tuple[str, str])
     if len(disagreement.choices[dimension]) > _MOST_CHOICES:
         grey = ""
     if not disagreement.differs[:, dimension].any():
-        return grey
+        return f"Both say the same everywhere. {grey}".strip()
     sides = (f"the first ({names[0]})", f"the second ({names[1]})")
     return f"Differently: {kinds_text(disagreement, dimension, sides)}. {grey}".strip()

@@ -51,12 +51,14 @@ class ReportedEpisodes(Struct):
 
     @property
     def rate(self) -> Rate | None:
-        """Of failures, where all is there that tells it."""
+        """Of failures, where all is there that tells it and no number contradicts another."""
         low, high = self.failure_low, self.failure_high
         if self.failures is None or not self.episodes or low is None or high is None:
             return None
         unknown = self.undecided if self.undecided is not None else self.cut or 0
         share = self.failures / self.episodes
+        if self.failures + unknown > self.episodes or not low <= share <= high:
+            return None
         return Rate(self.failures, self.episodes, share, low, high, unknown)
 
 

@@ -39,9 +39,17 @@ def whole_percents(html: Markup) -> Markup:
         html: The document.
 
     Returns:
-        The same with spaces between them that do not break.
+        The same with spaces between them that do not break; commands and scripts stay as they are,
+        because they are copied and run.
     """
-    return Markup(re.sub(r"(?<=\d) %", "\N{NO-BREAK SPACE}%", html))
+    return Markup(
+        re.sub(
+            r"(<(pre|script)\b.*?</\2>)|(?<=\d) %",
+            lambda found: found[1] or "\N{NO-BREAK SPACE}%",
+            html,
+            flags=re.DOTALL,
+        )
+    )
 
 
 @lru_cache(maxsize=1)
