@@ -116,12 +116,12 @@ def test_what_is_borne_is_asked_of_each_who_is_to_act(cart: Demonstrations) -> N
 
     first, second = borne(alone, novice, expert, calm, again)
     assert "up to 92 % of the episodes fail when the novice acts under the rules?" in first
-    assert "of 100 episodes (“a second test”), the worst of its 2 tests." in first
+    assert "of 100 episodes (“a second test”), the worst of 2 tests." in first
     assert "up to 1.8 % of the episodes fail when the expert acts under the rules?" in second
     assert "of 200 episodes (“expert, filtered”). No limit is certified of it." in second
     (ruled,) = borne(*(dataclasses.replace(one, freedom=0.0) for one in (calm, shielded)))
     assert "up to 64 % of the episodes fail when the rules act?" in ruled
-    assert "the worst of its 3 tests" in ruled
+    assert "the worst of 3 tests" in ruled
     (unmeasured,) = borne()
     assert "up to 3.7 % of the episodes fail when an agent follows the rules?" in unmeasured
     assert "of 3,000 episodes (on the card of the rules)." in unmeasured

@@ -111,7 +111,7 @@ def _of_pair(pair: Pair) -> OpenQuestion:
 
 
 def _borne(limit: FailureLimit) -> OpenQuestion:
-    worst = f", the worst of its {limit.tests} tests" if limit.tests > 1 else ""
+    worst = f", the worst of {limit.tests} tests" if limit.tests > 1 else ""
     return OpenQuestion(
         f"Can it be borne that up to {share_text(limit.share)} of the episodes fail when "
         f"{limit.acting}?",

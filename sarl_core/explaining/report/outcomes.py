@@ -424,10 +424,10 @@ def failures_at_most(pairs: Sequence[Pair], reported: ReportedEpisodes) -> tuple
     actors = dict.fromkeys(_actor(pair) for pair in pairs[:MOST_PAIRS]) or {(None, _FOLLOWING): 0}
     limits = []
     for agent, acting in actors:
-        own = [pair.shielded for pair in pairs if _actor(pair) == (agent, acting)]
+        own = [pair for pair in pairs if _actor(pair) == (agent, acting)]
         tests = [
             (one.crash_ends[1], one.episodes, f"“{one.name}”")
-            for one in own
+            for one in (_different(own) if agent is None else [pair.shielded for pair in own])
             if is_known(one) and one.crash_ends is not None
         ]
         if agent is None and reported.rate is not None:
