@@ -592,10 +592,5 @@ def run_seeds(
 def _played(
     env_id: EnvironmentOrId, agent: Agent, seeds: NDArray[np.int64], outcome: EpisodeArrays
 ) -> Episodes:
-    return Episodes(
-        env_id=str(env_id),
-        agent=agent.name,
-        seeds=seeds,
-        failure=failure_text(env_id),
-        **outcome._asdict(),
-    )
+    what = failure_text(env_id)
+    return Episodes(str(env_id), agent.name, seeds, failure=what, **outcome._asdict())

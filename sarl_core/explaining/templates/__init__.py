@@ -45,7 +45,7 @@ def whole_percents(html: Markup) -> Markup:
     return Markup(
         re.sub(
             r"(<(pre|script)\b.*?</\2>)|(?<=\d) %",
-            lambda found: found[1] or "\N{NO-BREAK SPACE}%",
+            lambda part: part[1] or "\N{NO-BREAK SPACE}%",
             html,
             flags=re.DOTALL,
         )
