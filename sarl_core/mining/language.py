@@ -541,7 +541,7 @@ def limits_text(rule_set: RuleContents) -> str:
     """
     thresholds = rule_set.thresholds
     limits = [f"support at least {limit_text(thresholds.support)}"]
-    if any(not rule.forbids for rule in rule_set.rules) or thresholds.never is None:
+    if thresholds.demands:
         limits.append(f"confidence at least {limit_text(thresholds.confidence)}")
     if thresholds.never is not None:
         limits.append(f"forbidden what the expert does in at most {limit_text(thresholds.never)}")

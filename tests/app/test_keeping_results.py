@@ -9,6 +9,7 @@ import pytest
 from sarl_core.library import Item, Library
 from sarl_core.library.results import add_result
 from sarl_dashboard.jobs.improving import outcome_cache
+from sarl_dashboard.jobs.queue import queue
 from tests.app.screens import errors, metrics, open_page, run_through, texts
 
 
@@ -110,6 +111,7 @@ def test_what_is_kept_of_an_improvement_and_damaged_can_be_run_again(place: Path
 def test_an_address_leads_to_a_page_of_this_dashboard_alone(
     address: str, offered: bool, tmp_path: Path
 ) -> None:
+    queue.cache_clear()  # of what other tests began there may be addresses, too
     (tmp_path / "a.csv").write_text("a,b\n1,2\n")
     with Library() as library:
         item = add_result(library, tmp_path / "a.csv", author="Ada", address=address)

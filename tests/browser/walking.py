@@ -33,9 +33,16 @@ quiet => {
 """
 
 
+# Whatever the page has sent by now is with the server when that has answered two questions.
+ANSWERED = """
+async () => { for (let i = 0; i < 2; i++) await fetch('/_stcore/health').catch(() => null) }
+"""
+
+
 def settle(screen: Page) -> None:
     """Wait until the script has run to its end, and what it sent is drawn."""
-    screen.wait_for_timeout(150)  # until a press has reached the server
+    screen.wait_for_timeout(150)  # until a press is sent
+    screen.evaluate(ANSWERED)
     screen.wait_for_function(STILL, arg=250)
 
 

@@ -25,6 +25,10 @@ def test_299_episodes_without_a_failure_certify_a_hundredth(run, tmp_path):
     assert document["seeds"] == {"first": CERTIFIED, "last": CERTIFIED + 298}
     assert json.loads(out.read_text()) == document
     assert load_certificate(out).verdict.certified is True
+
+
+def test_the_command_of_a_certificate_tests_the_same_again(run):
+    document = json.loads(run(*BASE, "--at-most", "0.1", "--json"))
     again = shlex.split(document["command"])[3:]
     assert json.loads(run(*again, "--json"))["seeds"] == document["seeds"]
 

@@ -307,7 +307,11 @@ def describe_rules(
             "confidence": thresholds.confidence,
             "lift": thresholds.lift,
             "max_depth": thresholds.max_depth,
-            **({} if thresholds.never is None else {"never": thresholds.never}),
+            **(
+                {}
+                if thresholds.never is None
+                else {"never": thresholds.never, "demands": thresholds.demands}
+            ),
         },
         "divider": rule_set.divider,
         "learner": rule_set.learner,

@@ -35,6 +35,7 @@ from sarl_core.mining.language import (
 )
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Bounds, Rule
+from sarl_core.mining.validation.holding_out import least_confidence
 from sarl_core.rendering.example_frames import ExampleFrame, Examples
 
 _MOST_VALUES = 3  # under a picture
@@ -247,12 +248,9 @@ def least_share(rule: Rule, rule_set: RuleSet) -> float | None:
     Returns:
         None where no thresholds cut the rules.
     """
-    limits = rule_set.thresholds
     if rule_set.cut != "thresholds":
         return None
-    if rule.forbids and limits.never is not None:
-        return 1.0 - limits.never
-    return limits.confidence
+    return least_confidence(rule, rule_set.thresholds)
 
 
 def _states(share: Share) -> str:
