@@ -137,7 +137,8 @@ def executor_of(jobs: int, executor: Executor | None) -> Executor | None:
 def _begin(parent: int, gives_way: bool, without: Sequence[str]) -> None:
     """End with the process that asked, let others go first where they should, and load less."""
     for package in without:
-        sys.modules.setdefault(package, None)  # type: ignore[arg-type]  # is then not to be found
+        # None where a module would be: importing it fails as where it is not installed.
+        sys.modules.setdefault(package, None)  # type: ignore[arg-type]
     if gives_way and hasattr(os, "nice"):
         os.nice(_NICENESS)
     Thread(target=_end_with, args=(parent,), daemon=True).start()
