@@ -110,22 +110,28 @@ def best_query(counts: NDArray[np.int64]) -> Query | None:
     bins = counts.shape[2]
     if bins < 2:
         return None
-    total = counts[0].sum(axis=1)
-    below = counts.cumsum(axis=2)[:, :, :-1]
+    total = counts[0].sum(axis=1).astype(np.float64)
+    # Whole numbers are added up faster.
+    below = counts[:, :, :-1].cumsum(axis=2).astype(np.float64)
     n_below = below.sum(axis=1)
     n_above = total.sum() - n_below
-    left = below.astype(np.float64)
-    right = total.astype(np.float64)[:, None] - left
-    # The impurity that is left is the number of states less this.
-    purity = np.einsum("dlb,dlb->db", left, left) / np.maximum(n_below, 1)
-    purity += np.einsum("dlb,dlb->db", right, right) / np.maximum(n_above, 1)
+    # The impurity that is left is the number of states less this. The squares of what is above
+    # are those of all and of what is below, less twice their product.
+    squares = np.einsum("dlb,dlb->db", below, below)
+    above = np.einsum("l,dlb->db", -2.0 * total, below)
+    above += squares
+    above += total @ total
+    purity = squares / np.maximum(n_below, 1.0)
+    above /= np.maximum(n_above, 1.0)
+    purity += above
     purity[(n_below == 0) | (n_above == 0)] = -1.0
     feature, first = divmod(int(purity.argmax()), bins - 1)
     if purity[feature, first] < 0.0:
         return None
     # Between two bins that hold states there may be empty ones: the border is in their middle.
     last = int(np.searchsorted(n_below[feature], n_below[feature, first], side="right")) - 1
-    return Query(feature, (first + last) // 2, below[feature, :, first])
+    left = below[feature, :, first].astype(np.int64)
+    return Query(feature, (first + last) // 2, left)
 
 
 def histogram_structure(
@@ -266,16 +272,17 @@ class _Growth:
 
         while waiting:
             part = waiting.pop()
-            leaves[part.rows] = part.node
             if not self._is_split(part):
-                continue
-            if self.least * _MANY_NODES <= len(part.rows) <= _SORTED:
+                leaves[part.rows] = part.node
+            elif self.least * _MANY_NODES <= len(part.rows) <= _SORTED:
                 future = self.threads.submit(self._sorted, replace(part, counts=None))
                 sorted_parts.append((part.node, part.rows, future))
                 if len(sorted_parts) > _WAITING:
                     take()
+            elif below := self._split(part):
+                waiting += below
             else:
-                waiting += self._split(part)
+                leaves[part.rows] = part.node
         while sorted_parts:
             take()
         return self._in_order(leaves)
@@ -332,7 +339,7 @@ class _Growth:
                 return part.counts
             return np.asarray(part.counts.reshape(d, self.labels, bins, together).sum(axis=3))
         size = self.labels * bins
-        keys = part.keys if bins == BINS else part.keys // (BINS // bins)
+        keys = part.keys if bins == BINS else part.keys >> (BINS // bins).bit_length() - 1
         if n > _AT_ONCE:
             counts = np.stack([np.bincount(column, minlength=size) for column in keys])
         else:
