@@ -153,3 +153,17 @@ def select_row(row: int | None, key: str) -> None:
     rows = [] if row is None else [row]
     if table is not None and list(table["selection"]["rows"]) != rows:
         st.session_state[key] = {"selection": {"rows": rows}}
+
+
+def rows_selected_anew(key: str, drawn: int | None) -> list[int] | None:
+    """The rows that somebody has just selected in a table; None where nobody has.
+
+    A table says what it was drawn with once it is there, together with whatever is pressed next: a
+    rule that a button has chosen would be taken back.
+
+    Args:
+        key: Of the table.
+        drawn: The row that it was drawn with, from 0.
+    """
+    rows = list(st.session_state[key]["selection"]["rows"])
+    return None if rows == ([] if drawn is None else [drawn]) else rows

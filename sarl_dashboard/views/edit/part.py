@@ -22,7 +22,7 @@ from sarl_dashboard.cache import cached
 from sarl_dashboard.components.journey.steps_needed import say_steps_needed
 from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.lists.rows import row_choice
-from sarl_dashboard.components.tables import row_height, table_height
+from sarl_dashboard.components.tables import row_height, rows_selected_anew, table_height
 from sarl_dashboard.state import edits, in_force
 from sarl_dashboard.state.data import chosen_demonstrations, held_out_demonstrations
 from sarl_dashboard.state.mined import Trees, mined_landscape
@@ -206,8 +206,9 @@ def _queries(chosen: TreePart) -> None:
     key = f"regrow_table_{hash((chosen.base.key, tuple(texts)))}"
 
     def pick() -> None:
-        rows = st.session_state[key]["selection"]["rows"]
-        set_url_choice("regrow", texts[rows[0]] if rows and rows[0] < len(texts) else "")
+        rows = rows_selected_anew(key, row)
+        if rows is not None:
+            set_url_choice("regrow", texts[rows[0]] if rows and rows[0] < len(texts) else "")
 
     names = _query_texts(chosen.tree, queries, demonstrations)
     high = row_height(chosen.now.rule_set)

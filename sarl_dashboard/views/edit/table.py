@@ -22,7 +22,12 @@ from sarl_dashboard.components.lists.pages import follow, number_of_pages, page_
 from sarl_dashboard.components.lists.rows import row_choice
 from sarl_dashboard.components.lists.rule_search import have_word, names_have_word
 from sarl_dashboard.components.settings import search_box, switch
-from sarl_dashboard.components.tables import action_column, row_height, table_height
+from sarl_dashboard.components.tables import (
+    action_column,
+    row_height,
+    rows_selected_anew,
+    table_height,
+)
 from sarl_dashboard.state import edits
 from sarl_dashboard.state.rule_base import Base
 from sarl_dashboard.state.url import set_url_choice, url_text
@@ -106,7 +111,7 @@ def _page_rows(
     rule_set = verdicts.rule_set
 
     def pick() -> None:
-        selected = st.session_state[key]["selection"]["rows"]
+        selected = rows_selected_anew(key, row)
         if selected and selected[0] < len(places):
             set_url_choice("rule", rule_set[int(places[selected[0]])].id)
 

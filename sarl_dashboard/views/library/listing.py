@@ -16,7 +16,7 @@ from sarl_core.library import Item, Library
 from sarl_core.library.bundles import ENDING, import_bundle
 from sarl_core.mining.language import counted
 from sarl_dashboard.components.lists.rows import row_choice
-from sarl_dashboard.components.tables import select_row, table_height
+from sarl_dashboard.components.tables import rows_selected_anew, select_row, table_height
 from sarl_dashboard.state.url import set_url_choice, url_name
 from sarl_dashboard.text import refuse
 
@@ -74,7 +74,7 @@ def choose_item(opened: Library, author: str) -> Item | None:
         _table(items, author),
         hide_index=True,
         height=table_height(len(items), 12),
-        on_select=partial(_choose, identifiers),
+        on_select=partial(_choose, identifiers, row),
         selection_mode="single-row",
         selection_default={"selection": {"rows": [] if row is None else [row]}},
         key="library_table",
@@ -83,16 +83,19 @@ def choose_item(opened: Library, author: str) -> Item | None:
             "Name": st.column_config.TextColumn(width="medium"),
         },
     )
-    row_choice("library_table", [one.name for one in items], row, partial(_choose, identifiers))
+    row_choice(
+        "library_table", [one.name for one in items], row, partial(_choose, identifiers, row)
+    )
     if item is None:
         st.caption(f"{counted(len(items), 'thing')}. Choose a row to open, share or remove it.")
     return item
 
 
-def _choose(identifiers: Sequence[str]) -> None:
-    """Let the address name the row that was chosen."""
-    rows = st.session_state["library_table"]["selection"]["rows"]
-    set_url_choice("item", identifiers[rows[0]] if rows else "")
+def _choose(identifiers: Sequence[str], drawn: int | None) -> None:
+    """Let the address name the row that was chosen, where another one was drawn."""
+    rows = rows_selected_anew("library_table", drawn)
+    if rows is not None:
+        set_url_choice("item", identifiers[rows[0]] if rows else "")
 
 
 def _table(items: list[Item], author: str) -> pd.DataFrame:

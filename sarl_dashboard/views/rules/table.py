@@ -10,7 +10,13 @@ from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_dashboard.components.lists.pages import follow, number_of_pages, page_choice
 from sarl_dashboard.components.settings import switch
-from sarl_dashboard.components.tables import column_config, row_height, select_row, table_height
+from sarl_dashboard.components.tables import (
+    column_config,
+    row_height,
+    rows_selected_anew,
+    select_row,
+    table_height,
+)
 from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.url import set_url_choice, url_text
 from sarl_dashboard.text import digest_of
@@ -195,7 +201,7 @@ def page_rows(places: Places, in_force: InForce, row: int | None, key: str) -> N
         height=table_height(len(places), TABLE_ROWS, high),
         row_height=high,
         key=key,
-        on_select=lambda: pick(rule_set, places, key),
+        on_select=lambda: pick(rule_set, places, key, row),
         selection_mode="single-row",
         selection_default={"selection": {"rows": [] if row is None else [row]}},
         alt="All rules in force",
@@ -210,8 +216,8 @@ def count_text(matching: int, in_force: InForce) -> str:
     return f"{matching:,} of {count.lower()} match." if matching < total else f"{count}."
 
 
-def pick(rule_set: RuleSet, places: Places, key: str) -> None:
-    """Choose the rule whose row was selected."""
-    rows = st.session_state[key]["selection"]["rows"]
+def pick(rule_set: RuleSet, places: Places, key: str, drawn: int | None) -> None:
+    """Choose the rule whose row was selected, which was drawn with another."""
+    rows = rows_selected_anew(key, drawn)
     if rows and rows[0] < len(places):
         set_url_choice("rule", rule_set[int(places[rows[0]])].id)
