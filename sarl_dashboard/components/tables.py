@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from time import monotonic
 from typing import Any, Literal
 
 import streamlit as st
@@ -20,6 +21,7 @@ from sarl_core.mining.rules import Rule
 from sarl_dashboard.components.journey.words import word_help
 
 ROW_HEIGHT = 33  # pixels, at the theme's font size
+_LATE = 2.0  # seconds in which a table may still say what was selected in it before
 _TALL_ROW = 76  # four lines
 _PHRASE = 260  # pixels: what a combination is called, on one line or two
 _NAME = 62  # pixels: four digits
@@ -150,20 +152,27 @@ def select_row(row: int | None, key: str) -> None:
         key: Of the table.
     """
     table = st.session_state.get(key)
-    rows = [] if row is None else [row]
-    if table is not None and list(table["selection"]["rows"]) != rows:
+    rows = _rows(row)
+    if table is not None and (before := list(table["selection"]["rows"])) != rows:
         st.session_state[key] = {"selection": {"rows": rows}}
+        st.session_state[f"_{key}_left"] = before, monotonic()
 
 
 def rows_selected_anew(key: str, drawn: int | None) -> list[int] | None:
     """The rows that somebody has just selected in a table; None where nobody has.
 
-    A table says what it was drawn with once it is there, together with whatever is pressed next: a
-    rule that a button has chosen would be taken back.
+    A table says what is selected in it a moment after it was drawn, and so maybe after something
+    else was chosen beside it, which that would take back.
 
     Args:
         key: Of the table.
         drawn: The row that it was drawn with, from 0.
     """
     rows = list(st.session_state[key]["selection"]["rows"])
-    return None if rows == ([] if drawn is None else [drawn]) else rows
+    left, when = st.session_state.pop(f"_{key}_left", (None, 0.0))
+    late = rows == left and monotonic() - when < _LATE
+    return None if late or rows == _rows(drawn) else rows
+
+
+def _rows(row: int | None) -> list[int]:
+    return [] if row is None else [row]
