@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
@@ -40,8 +40,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from sarl_core.mining.rule_set import RuleSet
-    from sarl_core.mining.tree import PolicyTree
+    from sarl_core.mining.rules import Thresholds
 
 
 @with_environment
@@ -155,10 +154,8 @@ def mine(
     Example: `python -m sarl_core mine data/demonstrations/lunar_lander.parquet --support 0.005
     --confidence 0.95 --out rules.json`
     """
-    far = cluster is not None or any(map(is_mined_file, [out, *files]))
-    if never is not None:
-        _require_near(far)
-    if far:
+    given = _Given(support, confidence, setting, never, lift, max_depth)
+    if cluster is not None or any(map(is_mined_file, [out, *files])):
         _mine_at_a_distance(
             files,
             out,
@@ -167,9 +164,7 @@ def mine(
             columns,
             missing,
             derived,
-            (support, confidence, setting),
-            lift=lift,
-            max_depth=max_depth,
+            given,
             divider=divider,
             hold_out=hold_out,
             seed=seed,
@@ -179,13 +174,7 @@ def mine(
         )
         return
     terminal.check_output(out, (".json",))
-    given = [value is not None for value in (support, confidence, setting)]
-    demands = given in ([True, True, False], [False, False, True])
-    forbids_alone = never is not None and given in ([True, False, False], [False, False, False])
-    if not demands and not forbids_alone:
-        raise InputError("give both --support and --confidence, or --setting instead of them")
-    if forbids_alone and lift:
-        raise InputError("--lift is for rules that demand an action; leave it out")
+    given.require_some()
     if lower_bound and hold_out is None:
         raise InputError(
             "--lower-bound asks what episodes say that a rule was not mined from, and none is held "
@@ -201,20 +190,14 @@ def mine(
 
     with terminal.working("Mining"):
         from sarl_core.cli.answers.evidence import Tried
-        from sarl_core.mining.algorithm_1 import mine_rules
         from sarl_core.mining.combining.choice import chosen_again
         from sarl_core.mining.envelope import with_boxes
         from sarl_core.mining.growing.growth import grow_policy_trees, learner_for
-        from sarl_core.mining.never.never_rules import mine_never_rules, with_never_rules
-        from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
+        from sarl_core.mining.never.never_rules import mine_at
         from sarl_core.mining.validation import cross_fitting, holding_out
         from sarl_core.shielding.leeway import leeway_of
 
-        pair = (support or 0.0, confidence or 0.0)
-        if setting is not None:
-            pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
-        # Refuse them before the file is read.
-        Thresholds(*pair, lift, max_depth, never)
+        thresholds = given.thresholds()  # refused before the file is read
         demonstrations = read_demonstrations(files, env, columns, missing)
         demonstrations = with_wanted(demonstrations, derived, divider=divider)
         combined = pairs_of(demonstrations, derived)
@@ -229,15 +212,7 @@ def mine(
         chosen = learner_for(learner, len(demonstrations))
         trees = grow_policy_trees(demonstrations, divider=divider, learner=chosen)
 
-        def mined_from(trees: Sequence[PolicyTree]) -> RuleSet:
-            if forbids_alone and never is not None:
-                return mine_never_rules(trees, epsilon=never, supp_min=pair[0], max_depth=max_depth)
-            demanding = mine_rules(
-                trees, supp_min=pair[0], conf_min=pair[1], lift_min=lift, max_depth=max_depth
-            )
-            return demanding if never is None else with_never_rules(demanding, trees, never)
-
-        rule_set = with_boxes(mined_from(trees), demonstrations)
+        rule_set = with_boxes(mine_at(trees, thresholds), demonstrations)
         judged = None
         if cross_fit:
             fit = cross_fitting.cross_fit(
@@ -247,7 +222,9 @@ def mine(
                 combined=combined,
                 learner=chosen,
             )
-            judged = fit.at(rule_set.thresholds) if never is None else fit.of(mined_from)
+            judged = fit.at(thresholds)
+            if never is not None:
+                judged = fit.of(partial(mine_at, thresholds=thresholds))
         if split is not None:
             rule_set = holding_out.with_held_out(rule_set, split.held_out)
         short = None
@@ -268,17 +245,48 @@ def mine(
         print_learner(trees)
 
 
-def _require_near(far: bool) -> None:
-    """Refuse rules that forbid where steps are not here.
+class _Given(NamedTuple):
+    """What is said of the rules; the thresholds in the words of the options."""
 
-    Raises:
-        InputError: If they are on a cluster, or in a .mined file.
-    """
-    if far:
-        raise InputError(
-            "--cluster, or a .mined file, is for rules that demand an action; leave it out, or "
-            "leave out --never"
-        )
+    support: float | None
+    confidence: float | None
+    setting: str | None
+    never: float | None
+    lift: float
+    max_depth: int | None
+
+    def demands(self) -> bool:
+        """Whether rules are to demand an action, too."""
+        named = [value is not None for value in self[:3]]
+        return named in ([True, True, False], [False, False, True])
+
+    def require_some(self) -> None:
+        """Refuse what says nothing whole.
+
+        Raises:
+            InputError: If it is neither for rules that demand nor for rules that forbid.
+        """
+        forbids = self.never is not None and self.confidence is None and self.setting is None
+        if not self.demands() and not forbids:
+            raise InputError("give both --support and --confidence, or --setting instead of them")
+        if forbids and self.lift:
+            raise InputError("--lift is for rules that demand an action; leave it out")
+
+    def thresholds(self) -> Thresholds:
+        """At which trees are cut.
+
+        Raises:
+            InputError: If one is out of range.
+        """
+        from sarl_core.mining.never.never_rules import never_thresholds
+        from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
+
+        if self.never is not None and not self.demands():
+            return never_thresholds(self.never, self.support or 0.0, self.max_depth)
+        pair = (self.support or 0.0, self.confidence or 0.0)
+        if self.setting is not None:
+            pair = (NAMED_SETTINGS[self.setting].support, NAMED_SETTINGS[self.setting].confidence)
+        return Thresholds(*pair, self.lift, self.max_depth, self.never)
 
 
 def _mine_at_a_distance(
@@ -289,10 +297,8 @@ def _mine_at_a_distance(
     columns: Columns,
     missing: Literal["refuse", "drop"],
     derived: Derived,
-    given: tuple[float | None, float | None, str | None],
+    given: _Given,
     *,
-    lift: float,
-    max_depth: int | None,
     divider: int,
     hold_out: float | None,
     seed: int,
@@ -304,7 +310,6 @@ def _mine_at_a_distance(
     into_mined = is_mined_file(out)
     terminal.check_output(out, (".json", MINED))
     of_mined = any(map(is_mined_file, files))
-    support, confidence, setting = given
     if whole:
         raise InputError(
             f"{whole} needs all steps in one memory; leave it out, or mine without a cluster"
@@ -314,9 +319,8 @@ def _mine_at_a_distance(
             f"{out}: a {MINED} file is made of steps, on a cluster; give these and --cluster, as "
             "local:2, or write a .json"
         )
-    named = [value is not None for value in given]
-    if named not in ([True, True, False], [False, False, True]) and not into_mined:
-        raise InputError("give both --support and --confidence, or --setting instead of them")
+    if not into_mined:
+        given.require_some()
     if of_mined and (hold_out is not None or len(files) > 1 or cluster is not None):
         raise InputError(
             f"{files[0]}: what is held out, and where, was settled when it was mined; give this "
@@ -324,10 +328,21 @@ def _mine_at_a_distance(
         )
     if of_mined:
         _require_no_reading(files, env, columns, derived, missing)
-    if into_mined and (lower_bound or max_depth is not None):
+    about_rules = {
+        "--lower-bound": lower_bound,
+        "--max-depth": given.max_depth,
+        "--never": given.never,
+    }
+    for option, value in about_rules.items():
+        if into_mined and value:
+            raise InputError(
+                f"{option} is about rules, and a {MINED} file gives those of any; say it when "
+                "rules are mined from it"
+            )
+    if lower_bound and given.never is not None:
         raise InputError(
-            f"{'--lower-bound' if lower_bound else '--max-depth'} is about rules, and a {MINED} "
-            "file gives those of any; say it when rules are mined from it"
+            "--lower-bound is for rules that demand an action where steps are not in one memory; "
+            "leave it out, or leave out --never"
         )
     nobody = "--lower-bound asks what episodes say that a rule was not mined from, and none is held"
     if lower_bound and hold_out is None and not of_mined:
@@ -343,13 +358,10 @@ def _mine_at_a_distance(
     with terminal.working("Mining") as advance:
         from sarl_core.cli.answers.evidence import Tried
         from sarl_core.mining.distributed.mined_files import load_mined_data, save_mined_data
-        from sarl_core.mining.rules import NAMED_SETTINGS, Thresholds
         from sarl_core.mining.validation import cross_fitting, holding_out
+        from sarl_core.shielding.leeway import leeway_of
 
-        pair = (support or 0.0, confidence or 0.0)
-        if setting is not None:
-            pair = (NAMED_SETTINGS[setting].support, NAMED_SETTINGS[setting].confidence)
-        Thresholds(*pair, lift, max_depth)  # refuse them before a file is read
+        thresholds = given.thresholds()  # refused before a file is read
         if cluster is None:
             mined = load_mined_data(files[0])
             if lower_bound and not mined.held_out:
@@ -364,8 +376,8 @@ def _mine_at_a_distance(
 
             floor = (
                 {}
-                if into_mined and support is None and setting is None
-                else {"min_support": pair[0]}
+                if into_mined and given.support is None and given.setting is None
+                else {"min_support": thresholds.support}
             )
             mined = mine_files(
                 files,
@@ -376,7 +388,7 @@ def _mine_at_a_distance(
                 formulas=derived.formulas,
                 pairs_of=partial(pairs_of, derived=derived) if derived.pairs else None,
                 divider=divider,
-                max_depth=max_depth,
+                max_depth=given.max_depth,
                 hold_out=hold_out or 0.0,
                 seed=seed,
                 progress=advance,
@@ -385,28 +397,39 @@ def _mine_at_a_distance(
         if into_mined:
             save_mined_data(mined, out)
         else:
-            rule_set = mined.mine(
-                supp_min=pair[0], conf_min=pair[1], lift_min=lift, max_depth=max_depth
-            )
-            tried = short = None
-            if mined.held_out:
+            rule_set = mined.at(thresholds)
+            tried = short = leeway = None
+            if thresholds.never is not None:
+                leeway = leeway_of(rule_set, mined.sample)
+            if mined.held_out and mined.counted(thresholds):
                 episodes = mined.held_out_episodes
                 if lower_bound:
                     short = holding_out.shortfall(rule_set.rules, lower_bound, episodes)
                     rule_set = holding_out.with_lower_bound(rule_set, lower_bound)
-                judged = cross_fitting.judge(rule_set, mined.count_rules(rule_set))
+                judged = mined.judged(thresholds)  # rules that forbid overlap
+                if thresholds.never is None or judged is None:
+                    judged = cross_fitting.judge(rule_set, mined.count_rules(rule_set))
                 there = rule_set.source.episodes
                 tried = Tried(mined.share, mined.seed, there, judged, short)
             rule_set.save(out)
     notes = list(mined.sample.notes)
+    elsewhere = "--hold-out"
+    if given.never is not None and any(tree.dimension.n_labels > 2 for tree in mined.trees):
+        elsewhere = "--cross-fit, which takes all steps in one memory,"
+        if mined.held_out:
+            notes.append(
+                "what was counted in held-out episodes says nothing of rules that forbid one of "
+                "more than two actions"
+            )
     if into_mined:
         document = describe_mined(mined, out)
         terminal.print_json(document) if as_json else print_mined(document)
     elif as_json:
-        terminal.print_json(describe_rules(rule_set, out, tried) | {"notes": notes})
+        answer = describe_rules(rule_set, out, tried, leeway=leeway)
+        terminal.print_json(answer | {"notes": notes})
     else:
         print_notes(notes)
-        print_rules(rule_set, out, tried, elsewhere="--hold-out")
+        print_rules(rule_set, out, tried, elsewhere=elsewhere, leeway=leeway)
         print_learner(mined.trees)
 
 

@@ -14,7 +14,9 @@ import pytest
 from sarl_core import RuleSet, rollout
 from sarl_core.cli.app import main
 from sarl_core.clusters import cluster
+from sarl_core.mining.distributed.mined_files import load_mined_data
 from sarl_core.processes import run_each
+from sarl_core.shielding.leeway import leeway_of
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "demonstrations"
 LANDER = DATA / "lunar_lander.parquet"
@@ -52,6 +54,20 @@ def test_rules_of_a_cluster_are_those_of_its_mined_file(run, mined_file, tmp_pat
     assert len(answer["held_out"]["episodes"]) == round(0.3 * 62)
     assert RuleSet.load(direct).digest == RuleSet.load(again).digest
     assert RuleSet.load(direct).rule_count == answer["rules"] > 20
+
+
+def test_rules_that_forbid_are_mined_from_its_mined_file(run, mined_file, tmp_path):
+    out = tmp_path / "never.json"
+    command = ("mine", mined_file, "--never", "0.1", "--support", "0.01", "--out", out)
+    answer = json.loads(run(*command, "--json"))
+    rules, sample = RuleSet.load(out), load_mined_data(mined_file).sample
+    assert all(rule.forbids and rule.support >= 0.01 for rule in rules)
+    assert answer["rules"] == rules.rule_count > 5
+    assert answer["freedom"] == leeway_of(rules, sample).freedom
+    assert "held_out" not in answer
+    assert any("forbid one of more than two actions" in note for note in answer["notes"])
+    run(*command[:4], "--setting", "filtered", "--out", out)
+    assert {bool(rule.forbids) for rule in RuleSet.load(out)} == {True, False}
 
 
 def test_combinations_and_formulas_are_chosen_and_worked_out_on_the_cluster(

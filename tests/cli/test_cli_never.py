@@ -95,7 +95,10 @@ def test_what_is_left_to_an_agent_is_told(typed, tmp_path):
         (("--never", "0.1", "--hold-out", "2"), "the held-out share is 2"),
         (("--never", "0.1", "--lower-bound", "0.8"), "give --hold-out as well"),
         (("--never", "0.1", "--lift", "3"), "--lift is for rules that demand"),
-        (("--never", "0.1", "--cluster", "local:2"), "--cluster, or a .mined file, is for rules"),
+        (
+            ("--never", "0.1", "--cluster", "local:2", "--hold-out", "0.2", "--lower-bound", "0.8"),
+            "--lower-bound is for rules that demand an action where steps are not in one memory",
+        ),
     ],
 )
 def test_what_cannot_be_mined_is_one_sentence(typed, tmp_path, options, said):
