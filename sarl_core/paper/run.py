@@ -45,7 +45,8 @@ def reproduce(
 
     Each study's files appear when it is finished, and with them its entry in ``report.json``. What
     an earlier run left in the folder stays until its study is finished anew. Pages follow from
-    tables and entries alone, so all are written again, and those that say the same stay the same.
+    tables and entries alone, so all are written again, once and whenever their entry has changed;
+    those that say the same stay the same.
 
     Args:
         folder: Where the files go; made where its parent exists.
@@ -63,6 +64,7 @@ def reproduce(
         CancelledError: If `watch` gave someone who wanted no more; what is finished is kept.
     """
     frames, report = _open(folder, studies)
+    written: dict[str, Entry] = {}
     with drawing_pictures() as draw:
         _write_script(folder)
         for study in studies:
@@ -87,8 +89,9 @@ def reproduce(
                 unfinished.write_bytes(content)
             write_table(frames[study.name], folder / entry.files["table"])
             for name, one in report.studies.items():
-                if name in frames:
+                if name in frames and written.get(name) != one:
                     _write_page(folder, STUDIES[name], frames[name], one)
+                    written[name] = one
             write_report(report, folder)
             finished(study.name, entry)
     return report

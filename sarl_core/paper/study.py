@@ -63,7 +63,7 @@ QUICK = Effort(
     recordings=2,
     phases=3,
     test_steps=2_000,
-    episodes=3,
+    episodes=1,
     snapped_episodes=1,
 )
 

@@ -162,6 +162,8 @@ class _Lanes:
         render_mode: str | None,
     ) -> None:
         self.env_id, self.agent = env_id, agent
+        # To look at every step takes a part of its time.
+        self.placed = agent if isinstance(agent, PlacedAgent) else None
         self.observer, self.render_mode = observer, render_mode
         self.seeds, self.max_steps, self.keep_steps = seeds, max_steps, keep_steps
         self.adapter, self.shield, notes = check_environment(env_id, shield)
@@ -215,8 +217,8 @@ class _Lanes:
         """Step every lane once, and give the number of episodes that ended."""
         states, adapter = self.states, self.adapter
         episodes = np.array([lane.episode for lane in self.lanes])
-        if isinstance(self.agent, PlacedAgent):
-            self.agent.place(episodes, self.lengths[episodes])
+        if self.placed is not None:
+            self.placed.place(episodes, self.lengths[episodes])
         choice = choose(
             self.agent, self.shield, adapter, states, [lane.generator for lane in self.lanes]
         )

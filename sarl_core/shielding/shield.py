@@ -107,6 +107,8 @@ class Shield:
             for dimension in range(len(rule_set.actions))
         )
         self._labels = np.array([rule.action for rule in rule_set.rules], dtype=np.int64)
+        # The last stands for no rule, which is -1.
+        self._demands = np.array([not rule.forbids for rule in used.rules] + [False])
         self._label_list: list[int] = self._labels.tolist()
         self._boxes = Boxes(used.rules, len(used.source.features))
         self._sides = self._boxes.sides
@@ -546,20 +548,19 @@ class Shield:
             log(labels): 1 where no rule applies or it abstains, 0 where one label is left, as
             every rule that demands one leaves.
         """
-        demands = np.array([not rule.forbids for rule in self._rules] + [False])
-        free = np.where(demands[rules], 0.0, 1.0)
+        free = np.where(self._demands[rules], 0.0, 1.0)
         if self._abstains or any(self._forbidding):
             observations = np.ascontiguousarray(self._extension.many(observations))
         for dimension, action in enumerate(self._actions):
             column, forbidding = rules[:, dimension], self._forbidding[dimension]
             if self._abstains:
-                ruled = np.flatnonzero(demands[column])
+                ruled = np.flatnonzero(self._demands[column])
                 beyond = self._boxes.leave_out(column[ruled], observations[ruled])
                 free[ruled[beyond], dimension] = 1.0
             if action.n_labels == 1:  # there was nothing to choose from
                 free[:, dimension] = 1.0
             elif forbidding is not None:
-                rows = np.flatnonzero((column >= 0) & ~demands[column])
+                rows = np.flatnonzero((column >= 0) & ~self._demands[column])
                 free[rows, dimension] = forbidding.freedom(np.ascontiguousarray(observations[rows]))
         return np.asarray(free.mean(axis=1))
 
