@@ -19,9 +19,17 @@ from sarl_core.mining.budgeted_trees import leaf_rules
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.progress import CancelledError
 
-PLAN = Plan(max_rules=5, rounds=3, episodes=4, validation=32, report=8)
+PLAN = Plan(max_rules=5, rounds=3, episodes=4, validation=16, report=8, max_steps=200)
 REFINED = Plan(
-    max_rules=4, rounds=1, episodes=4, validation=4, report=3, turns=1, search_episodes=2, seed=3
+    max_rules=4,
+    rounds=1,
+    episodes=4,
+    validation=4,
+    report=3,
+    turns=1,
+    search_episodes=2,
+    seed=3,
+    max_steps=100,
 )
 SEEDS = ("rounds", "validation", "refinement", "report")
 
@@ -132,7 +140,7 @@ def test_stopped_in_the_report_the_choice_stands(cart, finished, tmp_path):
     assert stopped.validation_mean == finished.validation_mean
     card = save_aggregation(stopped, tmp_path / "rules.json", command="").card
     assert card["seeds"] == {**dict.fromkeys(SEEDS), "rounds": 20_000_000, "validation": 30_000_000}
-    assert card["chosen_by"] == "the mean of up to 32 episodes of validation"
+    assert card["chosen_by"] == "the mean of up to 16 episodes of validation"
     assert card["reported_on"] is None
 
 

@@ -8,13 +8,16 @@ import pytest
 from imageio_ffmpeg import count_frames_and_secs
 from PIL import Image
 
-from sarl_core import InputError, Shield, load_demonstrations, mine_rules, rollout
+from sarl_core import Environment, InputError, Shield, load_demonstrations, mine_rules, rollout
+from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.progress import CancelledError
 from sarl_core.rendering.fork import Fork, Rest, endings, fork
 from sarl_core.rendering.overlay import GAP
 from sarl_core.rollouts.steps import StepTable
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
+# An episode of which few pictures are drawn.
+SHORT = Environment("CartPole-v1", '{"max_episode_steps": 120}')
 COLUMNS = ("observation", "proposed", "executed", "rules", "intervened", "margin", "reward")
 
 
@@ -30,7 +33,7 @@ def cart() -> Shield:
     return shield_of("cartpole")
 
 
-def original(env_id: str, shield: Shield, seed: int) -> StepTable:
+def original(env_id: EnvironmentOrId, shield: Shield, seed: int) -> StepTable:
     steps = rollout(env_id, "novice", shield=shield, episodes=1, seed=seed).steps
     assert steps is not None
     return steps
@@ -105,10 +108,8 @@ def test_the_branch_without_is_what_the_environment_does_with_those_actions(cart
 
 
 def test_the_same_fork_gives_the_same_picture(cart: Shield, tmp_path: Path) -> None:
-    step = int(np.flatnonzero(original("CartPole-v1", cart, 7).intervened)[20])
-    found, again = (
-        fork("CartPole-v1", "novice", cart, step=step, rest="alone", seed=7) for _ in range(2)
-    )
+    step = int(np.flatnonzero(original(SHORT, cart, 7).intervened)[20])
+    found, again = (fork(SHORT, "novice", cart, step=step, rest="alone", seed=7) for _ in range(2))
     assert found.replay.gif() == again.replay.gif()
     assert found.replay.gif() is found.replay.gif()
     picture = Image.open(io.BytesIO(found.replay.gif()))
@@ -132,17 +133,17 @@ def test_the_same_fork_gives_the_same_picture(cart: Shield, tmp_path: Path) -> N
 
 @pytest.fixture(scope="module")
 def calm(cart: Shield) -> int:
-    return int(np.flatnonzero(~original("CartPole-v1", cart, 7).intervened)[0])
+    return int(np.flatnonzero(~original(SHORT, cart, 7).intervened)[0])
 
 
 def test_where_nothing_was_changed_there_is_nothing_to_withhold(cart: Shield, calm: int) -> None:
     for step in (calm, 10_000, -1):
         with pytest.raises(InputError, match=f"change nothing at step {step} of seed 7"):
-            fork("CartPole-v1", "novice", cart, step=step, seed=7)
+            fork(SHORT, "novice", cart, step=step, seed=7)
     with pytest.raises(InputError, match="neither shielded nor alone"):
-        fork("CartPole-v1", "novice", cart, step=calm, rest="off", seed=7)  # type: ignore[arg-type]
+        fork(SHORT, "novice", cart, step=calm, rest="off", seed=7)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="seed is -1"):
-        fork("CartPole-v1", "novice", cart, step=calm, seed=-1)
+        fork(SHORT, "novice", cart, step=calm, seed=-1)
 
 
 def test_a_caller_who_wants_no_more_is_heard(cart: Shield) -> None:
@@ -151,8 +152,8 @@ def test_a_caller_who_wants_no_more_is_heard(cart: Shield) -> None:
 
 
 def test_a_fork_says_what_it_is(cart: Shield) -> None:
-    step = int(np.flatnonzero(original("CartPole-v1", cart, 7).intervened)[0])
-    found = fork("CartPole-v1", "novice", cart, step=step, seed=7)
+    step = int(np.flatnonzero(original(SHORT, cart, 7).intervened)[0])
+    found = fork(SHORT, "novice", cart, step=step, seed=7)
     assert isinstance(found, Fork)
     assert found.step == step
     assert [panel.title for panel in found.replay.panels] == [

@@ -208,7 +208,10 @@ def test_held_out_episodes_with_nearly_all_steps_are_refused(tmp_path: Path, min
         ("tcp://127.0.0.1:9", "no scheduler answers at 'tcp://127.0.0.1:9'; check the address"),
     ],
 )
-def test_clusters_that_are_none(address: str, sentence: str) -> None:
+def test_clusters_that_are_none(
+    address: str, sentence: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sarl_core.clusters._SECONDS", 1)
     with pytest.raises(InputError, match=sentence), cluster(address):
         pass
 
