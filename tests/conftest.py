@@ -7,6 +7,8 @@ import os
 # Two workers have two cores: threads of theirs would wait for each other, spinning. Matrices are
 # small here, and processes that tests start inherit it.
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+# Each of those processes would compile all that it loads.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import numpy as np
 import pytest

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, RuleSet, Shield, audit
@@ -51,6 +51,7 @@ def counted(
     return together(parts)
 
 
+@settings(max_examples=25)
 @given(
     cuts=st.lists(st.integers(0, 40), max_size=6).map(sorted),
     every=st.integers(1, 7),

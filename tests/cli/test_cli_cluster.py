@@ -31,9 +31,9 @@ def mined_file(tmp_path_factory):
     return path
 
 
-def test_rules_of_a_cluster_are_those_of_its_mined_file(run, mined_file, tmp_path):
+def test_rules_of_a_cluster_are_those_of_its_mined_file(run, running_cluster, mined_file, tmp_path):
     direct, again = tmp_path / "direct.json", tmp_path / "again.json"
-    command = ("mine", LANDER, "--cluster", "local:2", "--hold-out", "0.3")
+    command = ("mine", LANDER, "--cluster", running_cluster, "--hold-out", "0.3")
     printed = run(*command, "--support", "0.001", "--confidence", "0.9", "--out", direct)
     assert "held out" in printed
     assert "histogram" in printed
@@ -224,7 +224,7 @@ def test_ablations_and_learners_of_a_cluster_are_those_of_one_machine(
     run, running_cluster, cart_rules, tmp_path
 ):
     command = ("ablate", "--env", "CartPole-v1", "--agent", "novice", "--rules", cart_rules)
-    command += ("--episodes", "4", "--most", "3", "--json")
+    command += ("--episodes", "2", "--most", "2", "--max-steps", "100", "--json")
     assert json.loads(run(*command, "--cluster", running_cluster)) == json.loads(run(*command))
     learn = ("learn", "--env", "CartPole-v1", "--arm", "none", "--steps", "600", "--seeds", "2")
     learn += ("--episodes", "2")

@@ -201,7 +201,7 @@ def test_a_learner_chooses_from_what_they_leave(typed, tmp_path):
 
 def test_probes_leave_rules_and_a_card(typed, tmp_path):
     out = tmp_path / "never.json"
-    options = ("--rounds", "2", "--episodes", "12", "--validation", "10", "--report-episodes", "10")
+    options = ("--rounds", "2", "--episodes", "8", "--validation", "4", "--report-episodes", "4")
     arguments = ("probe", "--env", "CartPole-v1", *options, "--seed", "3", "--out", str(out))
     code, told, _ = typed(*arguments)
     assert code == 0
@@ -209,7 +209,7 @@ def test_probes_leave_rules_and_a_card(typed, tmp_path):
     card = json.loads(Path(out).with_suffix(".card.json").read_text())
     assert card["command"].startswith("python -m sarl_core probe --env CartPole-v1 --out ")
     assert [one["number"] for one in card["rounds"]] == [1, 2]
-    assert card["reported"]["episodes"] == 10
+    assert card["reported"]["episodes"] == 4
     rules = RuleSet.load(out)
     assert len(rules) == card["rules"]
     assert all(rule.origin == "probed" for rule in rules)

@@ -85,7 +85,7 @@ def test_evaluate_prints_a_row_an_episode_and_a_shield_helps_a_novice(run, cart_
 
 def test_evaluate_projects_as_told(run, tmp_path):
     rules = tmp_path / "rules.json"
-    run("mine", PENDULUM, "--support", 0, "--confidence", 0.9, "--divider", 5, "--out", rules)
+    run("mine", PENDULUM, "--support", 0, "--confidence", 0.9, "--divider", 3, "--out", rules)
     means = {
         json.loads(
             run(
@@ -97,7 +97,7 @@ def test_evaluate_projects_as_told(run, tmp_path):
                 "--rules",
                 rules,
                 "--episodes",
-                2,
+                1,
                 "--projection",
                 projection,
                 "--json",
@@ -138,6 +138,8 @@ def test_render_side_by_side_as_gif(run, cart_rules, tmp_path):
         cart_rules,
         "--seed",
         1,
+        "--max-steps",
+        60,
         "--out",
         path,
     )
@@ -159,6 +161,7 @@ def test_render_side_by_side_as_gif(run, cart_rules, tmp_path):
 
 def test_render_agrees_with_evaluate(run, cart_rules, tmp_path):
     arguments = ("--env", "CartPole-v1", "--agent", "novice", "--rules", cart_rules, "--seed", 5)
+    arguments += ("--max-steps", 60)
     rendered = json.loads(run("render", *arguments, "--out", tmp_path / "r.gif", "--json"))
     evaluated = json.loads(run("evaluate", *arguments, "--episodes", 1, "--json"))["episodes"][0]
     assert {name: rendered["episodes"][0][name] for name in evaluated} == evaluated

@@ -100,7 +100,7 @@ def test_thresholds_go_to_where_they_bring_more() -> None:
     before = mean_return(leaf_rules(trees))
     movement = Movement(trees, CARTPOLE, seed=0)
     assert movement.count == 1
-    for number in range(4):
+    for number in range(2):
         tried = movement.ask()
         assert len(tried) == POPULATION
         achieved = TRIAL.scores(tried, CARTPOLE, seed=number * 8, episodes=8, workers=None)
@@ -202,18 +202,18 @@ def search(*others, episodes: int = 2, **named) -> Refinement:
 def test_two_rules_over_two_features_balance_the_pole(sized_search) -> None:
     """What CART asks about first is another pair; what achieves more is found."""
     sized_search(
-        population=12,
+        population=8,
         _NEIGHBOURS=24,
         _EARLY=3,
-        _LATE=4,
+        _LATE=3,
         _MET=1,
-        _COMPARED=4,
+        _COMPARED=2,
     )
     ticks: list[tuple[int, int]] = []
-    last = search(episodes=12).run(
+    last = search(episodes=6).run(
         1, progress=lambda done, total: ticks.append((done, total)) or True
     )[-1]
-    assert ticks[-1] == (refinement_cost(1, 12), refinement_cost(1, 12))
+    assert ticks[-1] == (refinement_cost(1, 6), refinement_cost(1, 6))
     assert ticks == sorted(ticks)
     (first,) = grow_budgeted_trees(CARTPOLE, max_rules=2)
     assert mean_return(leaf_rules([first])) < 300

@@ -212,7 +212,7 @@ print(len(items))
 
 
 def test_a_process_that_is_killed_leaves_a_library_that_opens(place: LibraryPlace) -> None:
-    times = 100 if place.is_folder else 20
+    times = 40 if place.is_folder else 20
     arguments = [place.address, str(place.folder), str(times)]
     result = subprocess.run(
         [sys.executable, "-c", KILLED, *arguments],

@@ -76,7 +76,7 @@ def test_neither_batch_nor_processes_change_the_result(
     env_id: str, agent: str, stochastic: bool, shields: dict[str, Shield]
 ) -> None:
     actor = make_agent(agent, env_id, stochastic=stochastic)
-    arguments: Any = {"shield": shields[env_id], "episodes": 7, "seed": 11}
+    arguments: Any = {"shield": shields[env_id], "episodes": 5, "seed": 11, "max_steps": 120}
     whole = rollout(env_id, actor, **arguments)
     assert whole.interventions.sum() > 0 or agent == "expert"
     others: list[dict[str, Any]] = [

@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from sarl_core.agents.agent import Agent
+from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.processes import Processes
@@ -154,7 +155,8 @@ def test_where_a_process_dies_a_rollout_says_so_and_the_next_one_runs() -> None:
 def test_any_executor_fits_in() -> None:
     """As a Dask client's: one that is no process of ours, and says nothing of its size."""
     rules = mine_rules(record("CartPole-v1", "expert", steps=1_000), supp_min=0.0, conf_min=1.0)
-    asked = Task("CartPole-v1", make_agent("novice", "CartPole-v1"), Shield(rules), 7, 45)
+    cart = Environment("CartPole-v1", '{"max_episode_steps": 60}')
+    asked = Task(cart, make_agent("novice", cart), Shield(rules), 7, 45)
     whole = rollout(asked.env_id, asked.agent, shield=asked.shield, episodes=45, seed=7)
     with ThreadPoolExecutor(2) as executor:
         pieces = gathered(executor, [asked])[0]
