@@ -224,7 +224,7 @@ def test_ablations_and_learners_of_a_cluster_are_those_of_one_machine(
     run, running_cluster, cart_rules, tmp_path
 ):
     command = ("ablate", "--env", "CartPole-v1", "--agent", "novice", "--rules", cart_rules)
-    command += ("--episodes", "2", "--most", "2", "--max-steps", "100", "--json")
+    command += ("--episodes", "2", "--most", "2", "--json")
     assert json.loads(run(*command, "--cluster", running_cluster)) == json.loads(run(*command))
     learn = ("learn", "--env", "CartPole-v1", "--arm", "none", "--steps", "600", "--seeds", "2")
     learn += ("--episodes", "2")

@@ -84,7 +84,7 @@ def test_every_command_with_an_agent_takes_statistics(command, run, trained, car
     rest = {
         "record": ("--env", CART, "--steps", 50),
         "render": ("--env", CART, "--max-steps", 20),
-        "ablate": ("--env", CART, "--rules", cart_rules, "--episodes", 1, "--most", 2, "--jobs", 1),
+        "ablate": ("--env", CART, "--rules", cart_rules, "--episodes", 2, "--most", 2, "--jobs", 1),
         "aggregate": (data, "--rounds", 1, "--episodes", 2, "--validation", 2, "--max-rules", 2),
         "report": (cart_rules, "--demonstrations", data, "--episodes", 1, "--frames", 1),
     }[command]

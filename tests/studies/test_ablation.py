@@ -102,13 +102,13 @@ def by_brute_force(env_id: str, shield: Shield, rule: int, episodes: int, seed: 
 )
 def test_every_rule_is_what_running_without_it_gives(env_id: str, rules: object) -> None:
     shield = Shield(rules())  # type: ignore[operator]
-    found = ablate(env_id, "novice", shield, episodes=4, seed=500)
-    base = rollout(env_id, "novice", shield=shield, episodes=4, seed=500)
+    found = ablate(env_id, "novice", shield, episodes=3, seed=500)
+    base = rollout(env_id, "novice", shield=shield, episodes=3, seed=500)
     assert found.base.returns.tolist() == base.returns.tolist()
     assert not found.left_out
     assert sorted((*found.rules, *found.unused)) == list(range(len(shield.rule_set.rules)))
     for rule in range(len(shield.rule_set.rules)):
-        alone = by_brute_force(env_id, shield, rule, 4, 500)
+        alone = by_brute_force(env_id, shield, rule, 3, 500)
         if rule in found.rules:
             row = found.rules.index(rule)
             assert found.returns[row].tolist() == alone.returns.tolist()
@@ -160,8 +160,8 @@ def test_of_the_episodes_only_those_are_run_that_can_differ() -> None:
 
 @pytest.mark.parametrize(
     ("env_id", "rules", "jobs"),
-    [("CartPole-v1", mined, 2), ("CartPole-v1", overlapping, 3), ("Pendulum-v1", torque, 2)],
-    ids=["mined", "overlapping", "continuous"],
+    [("CartPole-v1", overlapping, 2), ("Pendulum-v1", torque, 2)],
+    ids=["overlapping", "continuous"],
 )
 def test_processes_change_nothing(env_id: str, rules: object, jobs: int) -> None:
     shield = Shield(rules(), projection="clip")  # type: ignore[operator]
