@@ -17,7 +17,7 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
 from sarl_core.mining.validation.recommendation import Recommendation, recommended
-from sarl_core.progress import Progress
+from sarl_core.progress import Progress, report
 from sarl_dashboard.cache import RESULTS, cached, keep, owner
 from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.mining import mining
@@ -28,7 +28,8 @@ from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider
 
 UNASKED = 250_000  # steps up to which it is made without being asked for
 PLACE = Place[CrossFit]("elsewhere")
-_DRAWING = 2.0  # seconds in which a browser draws a page; processes that start would hinder it
+DRAWING = 2.0  # seconds in which a browser draws a page; processes that start would hinder it
+_LOOK_SECONDS = 0.05  # between two looks at whether it is still wanted
 
 
 def key_of(demonstrations: Demonstrations, divider: int) -> tuple[object, ...]:
@@ -115,7 +116,7 @@ def begin(demonstrations: Demonstrations, divider: int, *, after: float = 0.0) -
     combined, learner = combining.pairs(demonstrations), learner_of(demonstrations)
 
     def work(executor: Executor, progress: Progress) -> CrossFit:
-        time.sleep(after)
+        _wait(after, progress)
         return cross_fit(
             demonstrations,
             divider=divider,
@@ -126,6 +127,14 @@ def begin(demonstrations: Demonstrations, divider: int, *, after: float = 0.0) -
         )
 
     PLACE.begin(lambda: mining(key, work, lambda fit: keep(key, fit, session)))
+
+
+def _wait(seconds: float, progress: Progress) -> None:
+    """Let time pass, unless the work is called off meanwhile."""
+    end = time.monotonic() + seconds
+    while (left := end - time.monotonic()) > 0:
+        report(progress, 0, 1)
+        time.sleep(min(left, _LOOK_SECONDS))
 
 
 def make_ready() -> None:
@@ -140,4 +149,4 @@ def make_ready() -> None:
     job = job_of(key)
     # What was made may have been let go of since, for want of room.
     if key not in RESULTS and (job is None or not (job.running or job.error)):
-        begin(demonstrations, divider, after=_DRAWING)
+        begin(demonstrations, divider, after=DRAWING)

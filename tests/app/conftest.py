@@ -4,15 +4,39 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from threading import Thread, current_thread
 from typing import Any
 
 import pytest
+from streamlit.components.v2 import manifest_scanner
 
+from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.state import library as state
 from tests.app.mined_file import MinedFiles, mined_files
+
+
+@pytest.fixture(scope="session", autouse=True)
+def one_scan() -> Iterator[None]:
+    """Every visit reads the files of all installed packages, for components; once is enough."""
+    with pytest.MonkeyPatch.context() as patch:
+        scan = cache(manifest_scanner.scan_component_manifests)
+        patch.setattr(manifest_scanner, "scan_component_manifests", scan)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def not_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trees without each fold are not grown beside every page that a test opens."""
+    monkeypatch.setattr(cross_fitting, "DRAWING", 3_600.0)
+
+
+@pytest.fixture
+def elsewhere(not_elsewhere: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trees without each fold are grown as soon as a page is open."""
+    monkeypatch.setattr(cross_fitting, "DRAWING", 0.0)
 
 
 @pytest.fixture(autouse=True)

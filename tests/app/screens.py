@@ -21,9 +21,11 @@ def open_page(name: str, **query: str | list[str]) -> AppTest:
     app = AppTest.from_file(ROUTER, default_timeout=120)
     for key, value in query.items():
         app.query_params[key] = value
+    if name != "overview":
+        app.switch_page(page_file(name))
     app.run()
     if name != "overview":
-        app.switch_page(page_file(name)).run()
+        app.switch_page(page_file(name))  # under its address, which is known from now on
     assert not app.exception, app.exception
     return app
 

@@ -17,6 +17,7 @@ from sarl_core.mining.validation.cross_fitting import Judged, cross_fit
 from sarl_core.progress import Progress, report
 from tests.app.screens import ROUTER, html, metrics, open_page
 
+pytestmark = pytest.mark.usefixtures("elsewhere")
 CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
 
 

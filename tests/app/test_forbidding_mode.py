@@ -145,6 +145,7 @@ def test_evidence_says_of_held_out_episodes_what_the_command_says() -> None:
     assert "minimum confidence" not in html(app) + texts(app)
 
 
+@pytest.mark.usefixtures("elsewhere")
 def test_all_rules_that_forbid_are_judged_in_episodes_that_they_were_not_mined_from() -> None:
     app = open_page("evidence", data="cartpole", mode="forbid", epsilon="0.1", support="0.01")
     shown = load_demonstrations(DATA / "demonstrations" / "cartpole.parquet")

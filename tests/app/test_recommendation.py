@@ -17,6 +17,8 @@ from tests.app.screens import ROUTER, metrics, open_page, texts
 from tests.app.test_elsewhere import CART, until
 from tests.app.test_thresholds_page import expected, specs
 
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
 
 def best(**limits: float) -> Recommendation:
     data = load_demonstrations(CART)
