@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import cast
 from urllib.parse import urlencode, urlsplit
 
@@ -17,6 +18,37 @@ from streamlit.runtime.state.query_params import parse_url_param
 from sarl_dashboard.text import escaped
 
 _MOST = 2.0**53  # beyond it a browser's numbers are not whole any more
+
+
+@dataclass
+class _Address:
+    """What a visit knows of its address, in one piece: it is looked at hundreds of times a run.
+
+    Attributes:
+        names: Parameters of choices that survive a change of page.
+        waits: Whether what is said waits until everything beside the page is drawn.
+        waiting: What the address will say, and does not yet.
+        said: Parameters that this run has said something of while it waited.
+        beside: What stands beside every page.
+        left: Values that choices on this page have just replaced.
+        order: Of the parameters, as the browser has them.
+    """
+
+    names: set[str] = field(default_factory=set)
+    waits: bool = False
+    waiting: dict[str, str | None] = field(default_factory=dict)
+    said: set[str] = field(default_factory=set)
+    beside: dict[str, str] = field(default_factory=dict)
+    left: dict[str, str] = field(default_factory=dict)
+    order: tuple[str, ...] = ()
+
+    def value(self, name: str) -> str | None:
+        """What the address says, or will say."""
+        return self.waiting[name] if name in self.waiting else st.query_params.get(name)
+
+
+def _address() -> _Address:
+    return cast(_Address, st.session_state.setdefault("_url_state", _Address()))
 
 
 def url_choice(name: str, options: Sequence[str], default: str) -> str:
@@ -44,9 +76,10 @@ def url_text(name: str, default: str, valid: Callable[[str], bool]) -> str:
     Returns:
         The default, or a valid text.
     """
-    st.session_state.setdefault("_url_names", set()).add(name)
-    value = _in_url(name)
-    if value is not None and name not in _waiting() and _is_late(name, value):
+    address = _address()
+    address.names.add(name)
+    value = address.value(name)
+    if value is not None and name not in address.waiting and _is_late(address, name, value):
         value = None  # the browser had not heard of the choice when it asked for this run
     if value is not None and not valid(value):
         note_unusable(name, value)
@@ -54,7 +87,7 @@ def url_text(name: str, default: str, valid: Callable[[str], bool]) -> str:
         value = str(st.session_state.get(f"_{name}", default))
     if not valid(value):
         value = default
-    set_url_choice(name, value, default)
+    _choose(address, name, value, default)
     return value
 
 
@@ -76,14 +109,17 @@ def set_url_choice(name: str, value: str, default: str = "") -> None:
         value: Its new value.
         default: Value that needs no place in the URL.
     """
+    _choose(_address(), name, value, default)
+
+
+def _choose(address: _Address, name: str, value: str, default: str) -> None:
     st.session_state[f"_{name}"] = value
-    before = _in_url(name)
-    left = st.session_state.setdefault("_values_left", {})
-    if left.get(name) == value:
-        del left[name]
+    before = address.value(name)
+    if address.left.get(name) == value:
+        del address.left[name]
     if before not in (None, value):
-        left[name] = before
-    say_in_url(name, None if value == default else value)
+        address.left[name] = before
+    _say(address, name, None if value == default else value)
 
 
 def say_in_url(name: str, value: str | None) -> None:
@@ -96,27 +132,29 @@ def say_in_url(name: str, value: str | None) -> None:
         name: URL parameter.
         value: None to leave it out.
     """
+    _say(_address(), name, value)
+
+
+def _say(address: _Address, name: str, value: str | None) -> None:
     context = get_script_run_ctx()
-    if st.session_state.get("_url_waits") and not (context and context.fragment_ids_this_run):
-        _waiting()[name] = value
-        st.session_state.setdefault("_url_said", set()).add(name)
+    if address.waits and not (context and context.fragment_ids_this_run):
+        address.waiting[name] = value
+        address.said.add(name)
     else:
-        beside = st.session_state.get("_url_beside", {})
-        if beside.get(name) != value:
-            beside.pop(name, None)
+        if address.beside.get(name) != value:
+            address.beside.pop(name, None)
         _write({name: value})
 
 
 def write_url() -> None:
     """Write what waits into the URL, in one piece; from here on nothing waits in this run."""
-    st.session_state["_url_waits"] = False
-    waiting, said = _waiting(), st.session_state["_url_said"]
-    _write(waiting)
+    address = _address()
+    address.waits = False
+    _write(address.waiting)
     # In the order of the address: the same in another order is another one to go back to.
-    st.session_state["_url_beside"] = {
-        name: waiting[name] for name in st.query_params if name in said and waiting[name]
-    }
-    waiting.clear()
+    said = {name: address.waiting[name] for name in st.query_params if name in address.said}
+    address.beside = {name: value for name, value in said.items() if value}
+    address.waiting.clear()
 
 
 def bring_along(now: Mapping[str, str | None]) -> None:
@@ -134,8 +172,11 @@ def bring_along(now: Mapping[str, str | None]) -> None:
     st.session_state["_page_hash"] = page
     if page == before or (context and context.is_history_navigation):
         return
-    beside = st.session_state.get("_url_beside", {}) | now
-    _write_in_order({name: one for name, one in beside.items() if one and _in_url(name) is None})
+    address = _address()
+    beside = {**address.beside, **now}
+    _write_in_order(
+        {name: one for name, one in beside.items() if one and address.value(name) is None}
+    )
 
 
 def _write_in_order(values: Mapping[str, str]) -> None:
@@ -150,7 +191,7 @@ def _write_in_order(values: Mapping[str, str]) -> None:
         there = {name: url.get_all(name) for name in url} | {
             name: [value] for name, value in values.items()
         }
-        before = st.session_state.get("_url_order", ())
+        before = _address().order
         ordered = sorted(there, key=lambda name: (*before, name).index(name))
         for name in list(url):
             url.discard_param_no_forward_msg(name)
@@ -163,7 +204,7 @@ def end_run(page: str) -> None:
     Args:
         page: Title of the page that has run.
     """
-    st.session_state["_url_waits"] = True
+    _address().waits = True
     unusable = [*st.session_state.get("_unusable", ()), *_refused_by_widgets()]
     if unusable:
         before, _ = st.session_state.get("_left_out_of_link", ((), page))
@@ -178,9 +219,10 @@ def stay_beside() -> None:
     What a page's widgets are bound to, Streamlit takes out of the address before anything here
     runs: the browser would write an address without it, and go back to that.
     """
-    st.session_state["_url_order"] = list(st.query_params)
+    address = _address()
+    address.order = tuple(st.query_params)
     with get_session_state().query_params() as url:
-        for name in st.session_state.get("_url_said", ()):
+        for name in address.said:
             if binding := url.get_binding_for_param(name):
                 url.unbind_widget(binding.widget_id)
 
@@ -251,16 +293,6 @@ def _is_same(said: list[str], state: WidgetState) -> bool:
     return bool(meant == value)
 
 
-def _waiting() -> dict[str, str | None]:
-    """What the URL will say, and does not yet."""
-    return cast("dict[str, str | None]", st.session_state.setdefault("_url_waiting", {}))
-
-
-def _in_url(name: str) -> str | None:
-    waiting = _waiting()
-    return waiting[name] if name in waiting else st.query_params.get(name)
-
-
 def _write(values: Mapping[str, str | None]) -> None:
     with get_session_state().query_params() as url:
         free = {name: value for name, value in values.items() if not url.is_bound(name)}
@@ -275,13 +307,13 @@ def _write(values: Mapping[str, str | None]) -> None:
             del url[gone[0]]
 
 
-def _is_late(name: str, value: str) -> bool:
+def _is_late(address: _Address, name: str, value: str) -> bool:
     """Whether a value of the URL is the one that a choice on this page has just replaced.
 
     A browser that is asked for two runs in a row writes the old value into the second request. It
     comes back by being chosen, by a link from another page, or by the browser's "back".
     """
-    return bool(st.session_state.get("_values_left", {}).get(name) == value)
+    return address.left.get(name) == value
 
 
 def begin_run(page: str) -> None:
@@ -290,19 +322,19 @@ def begin_run(page: str) -> None:
     Args:
         page: Title of the page that runs.
     """
-    context = get_script_run_ctx()
+    context, address = get_script_run_ctx(), _address()
     went_back = bool(context and context.is_history_navigation)
     if went_back:
         # An address that was on screen says everything: what it does not name has its default.
-        for name in st.session_state.get("_url_names", ()):
+        for name in address.names:
             if name not in st.query_params:
                 st.session_state.pop(f"_{name}", None)
     st.session_state["_went_back"] = went_back
-    st.session_state["_url_waits"], st.session_state["_url_said"] = True, set()
+    address.waits, address.said = True, set()
     if st.session_state.get("_page") != page or went_back:
         st.session_state["_page"] = page
-        _waiting().clear()
-        st.session_state.pop("_values_left", None)
+        address.waiting.clear()
+        address.left.clear()
         # What was on screen before was usable then.
         said = (
             {} if went_back else {name: st.query_params.get_all(name) for name in st.query_params}

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from streamlit.components.v2 import manifest_scanner
 
+from sarl_core.rendering import gif_and_mp4
 from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.state import library as state
@@ -37,6 +38,13 @@ def not_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
 def elsewhere(not_elsewhere: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Trees without each fold are grown as soon as a page is open."""
     monkeypatch.setattr(cross_fitting, "DRAWING", 0.0)
+
+
+@pytest.fixture(autouse=True)
+def thin_films(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a film every twentieth picture is encoded: as long as all of them takes nothing else."""
+    schedule = gif_and_mp4.schedule
+    monkeypatch.setattr(gif_and_mp4, "schedule", lambda *film: schedule(*film)[::20])
 
 
 @pytest.fixture(autouse=True)

@@ -43,14 +43,19 @@ def elsewhere(demonstrations: Demonstrations) -> Demonstrations:
     )
 
 
-@pytest.fixture
-def compact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RuleSet:
-    """Compact rules for the cart pole, some of which no demonstrated state reaches."""
-    rules = leaf_rules(grow_budgeted_trees(elsewhere(CARTPOLE), max_rules=8))
-    rules.save(tmp_path / "cartpole_compact.json")
+@pytest.fixture(scope="module")
+def built() -> dict[str, RuleSet]:
+    """Compact rules by their file's name."""
     walking = leaf_rules(grow_budgeted_trees(WALKER, max_rules=6, divider=3))
-    walking.save(tmp_path / "bipedal_walker_compact.json")
-    open_page("demonstrations", data="cartpole")  # finds the modules of the pages
+    rules = leaf_rules(grow_budgeted_trees(elsewhere(CARTPOLE), max_rules=8))
+    return {"bipedal_walker_compact.json": walking, "cartpole_compact.json": rules}
+
+
+@pytest.fixture
+def compact(built: dict[str, RuleSet], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> RuleSet:
+    """Compact rules for the cart pole, some of which no demonstrated state reaches."""
+    for name, rules in built.items():
+        rules.save(tmp_path / name)
     monkeypatch.setattr("sarl_dashboard.state.rule_files.RULES_FOLDER", tmp_path)
     return RuleSet.load(tmp_path / "cartpole_compact.json")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import Demonstrations, load_demonstrations
 from sarl_core.explaining.words.cross_fit import elsewhere_text, judged_sentence
 from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
-from sarl_core.mining.validation.cross_fitting import Judged, cross_fit
+from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
 from sarl_core.progress import Progress, report
 from tests.app.screens import ROUTER, html, metrics, open_page
 
@@ -21,8 +22,13 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
 CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
 
 
+@cache
+def fit() -> CrossFit:
+    return cross_fit(load_demonstrations(CART))
+
+
 def expected(thresholds: Thresholds) -> Judged:
-    return cross_fit(load_demonstrations(CART)).at(thresholds)
+    return fit().at(thresholds)
 
 
 def until(app: AppTest, words: str) -> None:

@@ -73,6 +73,16 @@ def test_a_page_without_data_sends_one_to_them_and_no_further() -> None:
     assert next_links(open_page("rules", data="upload")) == []
 
 
+def test_an_address_of_before_takes_along_all_that_it_says() -> None:
+    shields = ["no shield", "compact"]
+    app = AppTest.from_file(ROUTER, default_timeout=120)
+    app.query_params["shields"] = shields
+    # Where no page is known yet, the name of the file is the address: here the one of before.
+    app.switch_page("shield.py").run()
+    assert app.title[0].value == "Measure"
+    assert app.query_params["shields"] == shields
+
+
 @pytest.mark.parametrize("title", TITLES)
 def test_a_page_says_in_one_sentence_under_its_title_what_it_answers(title: str) -> None:
     page = ast.parse((ROUTER.parent / TITLES[title]).read_text())

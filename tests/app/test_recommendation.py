@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from streamlit.testing.v1 import AppTest
 from sarl_core import Demonstrations, load_demonstrations
 from sarl_core.explaining.words.cross_fit import no_recommendation_text, recommendation_sentences
 from sarl_core.mining.growing.growth import grow_policy_trees
-from sarl_core.mining.validation.cross_fitting import cross_fit
+from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.validation.cross_fitting import CrossFit, cross_fit
 from sarl_core.mining.validation.recommendation import Recommendation, recommended
 from tests.app.screens import ROUTER, metrics, open_page, texts
 from tests.app.test_elsewhere import CART, until
@@ -20,9 +22,15 @@ from tests.app.test_thresholds_page import expected, specs
 pytestmark = pytest.mark.usefixtures("elsewhere")
 
 
-def best(**limits: float) -> Recommendation:
+@cache
+def grown() -> tuple[tuple[PolicyTree, ...], CrossFit]:
+    """The trees of the page, and those without each fold."""
     data = load_demonstrations(CART)
-    found = recommended(grow_policy_trees(data), cross_fit(data), **limits)
+    return grow_policy_trees(data), cross_fit(data)
+
+
+def best(**limits: float) -> Recommendation:
+    found = recommended(*grown(), **limits)
     assert found is not None
     return found
 
