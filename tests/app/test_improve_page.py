@@ -5,6 +5,7 @@ import shlex
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -224,12 +225,14 @@ def commands(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
 
 
 def test_combinations_are_chosen_again_in_every_round_as_the_command_line_does(
-    commands: list[list[str]],
+    commands: list[list[str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # To report on a hundred episodes takes longer than all the rest.
+    monkeypatch.setattr("sarl_dashboard.views.improve.order.Plan", partial(Plan, report=5))
     small = {**SMALL, "rounds": "1"}
     app = run(open_page("improve", data="cartpole", combine="2,3", **small))
     assert not errors(app)
-    expected = aggregate(CARTPOLE, replace(PLAN, rounds=1, combined=((2, 3),)))
+    expected = aggregate(CARTPOLE, replace(PLAN, rounds=1, report=5, combined=((2, 3),)))
     assert expected.reported is not None
     assert metrics(app)["Mean return"] == f"{expected.reported.statistics.mean:,.1f}"
     assert metrics(app)["Rules"] == str(len(expected.rule_set))

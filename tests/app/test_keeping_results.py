@@ -48,12 +48,14 @@ IMPROVE = {
     "data": "cartpole",
     "max_rules": "4",
     "rounds": "2",
-    "round_episodes": "4",
-    "validation": "8",
+    "round_episodes": "3",
+    "validation": "2",
 }
 
 
-def test_an_improvement_is_kept_with_its_rules_and_there_again_after_a_restart() -> None:
+def test_an_improvement_is_kept_with_its_rules_and_there_again_after_a_restart(
+    place: Path,
+) -> None:
     app = run_through(open_page("improve", **IMPROVE), "improve")
     before = metrics(app)
     assert before["Mean return"]
@@ -75,6 +77,13 @@ def test_an_improvement_is_kept_with_its_rules_and_there_again_after_a_restart()
     other = open_page("improve", **IMPROVE | {"rounds": "1"})
     assert not metrics(other)
     assert not errors(open_page("library", item=item.id))
+    # What is damaged of it can be run again.
+    restarted()
+    for path in (place / "files").glob("*/*.json"):
+        path.write_bytes(b"{")
+    again = open_page("improve", **IMPROVE)
+    assert not errors(again)
+    assert not again.button(key="run_improve").disabled
 
 
 def test_states_that_need_a_demonstration_are_kept_and_there_again() -> None:
@@ -86,16 +95,6 @@ def test_states_that_need_a_demonstration_are_kept_and_there_again() -> None:
     restarted()
     again = open_page("improve", **asked)
     assert again.dataframe[0].value.equals(app.dataframe[0].value)
-
-
-def test_what_is_kept_of_an_improvement_and_damaged_can_be_run_again(place: Path) -> None:
-    run_through(open_page("improve", **IMPROVE), "improve")
-    restarted()
-    for path in (place / "files").glob("*/*.json"):
-        path.write_bytes(b"{")
-    again = open_page("improve", **IMPROVE)
-    assert not errors(again)
-    assert not again.button(key="run_improve").disabled
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import shlex
 import shutil
-import subprocess
-import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,6 +11,7 @@ import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules
+from sarl_core.cli.app import main
 from sarl_core.errors import InputError
 from sarl_core.library import Library, Quota
 from sarl_core.library.contents import add_rules, annotated_file, rules_of
@@ -303,9 +302,11 @@ def test_the_commands_of_kept_rules_make_them_again(
     app.button(key="keep_rules").click().run()
     with Library() as library:
         (item,) = library.items("Ada", kind="rules")
-    monkeypatch.setenv("PYTHONPATH", str(DATA.parents[1]))
+    monkeypatch.chdir(tmp_path)
     for line in item.command.splitlines():
-        subprocess.run([sys.executable, *shlex.split(line)[1:]], check=True, cwd=tmp_path)
+        words = shlex.split(line)
+        assert words[:3] == ["python", "-m", "sarl_core"]
+        assert main(words[3:]) == 0
     assert rules_digest(RuleSet.load(tmp_path / "exported.json")) == item.digest
 
 
