@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 from streamlit.components.v2 import manifest_scanner
+from streamlit.testing.v1 import app_test
 
 from sarl_core.rendering import gif_and_mp4
 from sarl_dashboard.jobs import cross_fitting
@@ -20,11 +21,15 @@ from tests.app.mined_file import MinedFiles, mined_files
 
 
 @pytest.fixture(scope="session", autouse=True)
-def one_scan() -> Iterator[None]:
-    """Every visit reads the files of all installed packages, for components; once is enough."""
+def one_server() -> Iterator[None]:
+    """What a server does once, Streamlit's tests do at each visit, and more slowly than the rest.
+
+    It reads what is said of all installed packages, for components, and compiles the pages.
+    """
     with pytest.MonkeyPatch.context() as patch:
         scan = cache(manifest_scanner.scan_component_manifests)
         patch.setattr(manifest_scanner, "scan_component_manifests", scan)
+        patch.setattr(app_test, "ScriptCache", cache(app_test.ScriptCache))
         yield
 
 
