@@ -114,7 +114,7 @@ if page is PAGES[0] and not st.query_params and (link := link_before_sign_in()):
     st.switch_page(wanted, query_params=link.query)
 if page in aliases:
     meant = next(other for other in PAGES if other.title == page.title)
-    st.switch_page(meant, query_params=without(()))
+    st.switch_page(meant, query_params=without())
 begin_run(page.title)
 if absurd := absurd_parameters():
     # Widgets take their values from the address before anything here could mend them.

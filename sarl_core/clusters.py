@@ -21,7 +21,7 @@ VARIABLE = "SARL_CLUSTER"
 """The environment variable that names a cluster for the jobs of a dashboard."""
 _LOCAL = re.compile(r"local:(?P<workers>\d{1,3})(?::(?P<memory>\d+(?:\.\d+)?\s*[kMGT]i?B))?")
 _SECONDS = 10  # to wait for a scheduler, and for its first worker
-_START_SECONDS = 15  # to wait for processes of this machine
+_START_SECONDS = 60  # to wait for processes of this machine
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from sarl_core.mining.distributed.mined_data import MinedData
     from sarl_core.mining.rules import Thresholds
 
 
@@ -154,7 +156,7 @@ def mine(
     Example: `python -m sarl_core mine data/demonstrations/lunar_lander.parquet --support 0.005
     --confidence 0.95 --out rules.json`
     """
-    given = _Given(support, confidence, setting, never, lift, max_depth)
+    given = _RuleOptions(support, confidence, setting, never, lift, max_depth)
     if cluster is not None or any(map(is_mined_file, [out, *files])):
         _mine_at_a_distance(
             files,
@@ -222,9 +224,8 @@ def mine(
                 combined=combined,
                 learner=chosen,
             )
-            judged = fit.at(thresholds)
-            if never is not None:
-                judged = fit.of(partial(mine_at, thresholds=thresholds))
+            cut = partial(mine_at, thresholds=thresholds)
+            judged = fit.at(thresholds) if never is None else fit.of(cut)
         if split is not None:
             rule_set = holding_out.with_held_out(rule_set, split.held_out)
         short = None
@@ -245,8 +246,8 @@ def mine(
         print_learner(trees)
 
 
-class _Given(NamedTuple):
-    """What is said of the rules; the thresholds in the words of the options."""
+class _RuleOptions(NamedTuple):
+    """Options that say which rules are mined, None where not given."""
 
     support: float | None
     confidence: float | None
@@ -257,8 +258,12 @@ class _Given(NamedTuple):
 
     def demands(self) -> bool:
         """Whether rules are to demand an action, too."""
-        named = [value is not None for value in self[:3]]
-        return named in ([True, True, False], [False, False, True])
+        pair = [self.support is not None, self.confidence is not None]
+        return pair == [False, False] if self.setting is not None else pair == [True, True]
+
+    def asks_support(self) -> bool:
+        """Whether a minimum support is among them."""
+        return self.support is not None or self.setting is not None
 
     def require_some(self) -> None:
         """Refuse what says nothing whole.
@@ -268,7 +273,10 @@ class _Given(NamedTuple):
         """
         forbids = self.never is not None and self.confidence is None and self.setting is None
         if not self.demands() and not forbids:
-            raise InputError("give both --support and --confidence, or --setting instead of them")
+            alone = "" if self.never is None else ", or leave both out for rules that forbid alone"
+            raise InputError(
+                f"give both --support and --confidence, or --setting instead of them{alone}"
+            )
         if forbids and self.lift:
             raise InputError("--lift is for rules that demand an action; leave it out")
 
@@ -297,7 +305,7 @@ def _mine_at_a_distance(
     columns: Columns,
     missing: Literal["refuse", "drop"],
     derived: Derived,
-    given: _Given,
+    given: _RuleOptions,
     *,
     divider: int,
     hold_out: float | None,
@@ -332,9 +340,10 @@ def _mine_at_a_distance(
         "--lower-bound": lower_bound,
         "--max-depth": given.max_depth,
         "--never": given.never,
+        "--lift": given.lift or None,
     }
     for option, value in about_rules.items():
-        if into_mined and value:
+        if into_mined and value is not None:
             raise InputError(
                 f"{option} is about rules, and a {MINED} file gives those of any; say it when "
                 "rules are mined from it"
@@ -374,11 +383,7 @@ def _mine_at_a_distance(
         else:
             from sarl_core.mining.distributed.mining import mine_files
 
-            floor = (
-                {}
-                if into_mined and given.support is None and given.setting is None
-                else {"min_support": thresholds.support}
-            )
+            floor = {"min_support": thresholds.support} if given.asks_support() else {}
             mined = mine_files(
                 files,
                 cluster,
@@ -397,6 +402,8 @@ def _mine_at_a_distance(
         if into_mined:
             save_mined_data(mined, out)
         else:
+            if not given.asks_support():
+                thresholds = replace(thresholds, support=mined.min_support)
             rule_set = mined.at(thresholds)
             tried = short = leeway = None
             if thresholds.never is not None:
@@ -406,21 +413,21 @@ def _mine_at_a_distance(
                 if lower_bound:
                     short = holding_out.shortfall(rule_set.rules, lower_bound, episodes)
                     rule_set = holding_out.with_lower_bound(rule_set, lower_bound)
-                judged = mined.judged(thresholds)  # rules that forbid overlap
-                if thresholds.never is None or judged is None:
-                    judged = cross_fitting.judge(rule_set, mined.count_rules(rule_set))
+                judged = (
+                    cross_fitting.judge(rule_set, mined.count_rules(rule_set))
+                    if thresholds.never is None
+                    else mined.judged(thresholds)  # rules that forbid overlap
+                )
+                assert judged is not None
                 there = rule_set.source.episodes
                 tried = Tried(mined.share, mined.seed, there, judged, short)
             rule_set.save(out)
     notes = list(mined.sample.notes)
-    elsewhere = "--hold-out"
-    if given.never is not None and any(tree.dimension.n_labels > 2 for tree in mined.trees):
-        elsewhere = "--cross-fit, which takes all steps in one memory,"
-        if mined.held_out:
-            notes.append(
-                "what was counted in held-out episodes says nothing of rules that forbid one of "
-                "more than two actions"
-            )
+    elsewhere = "mining the steps again with --hold-out" if of_mined else "--hold-out"
+    if given.never is not None:
+        notes += _notes_on_forbidding(mined)
+        if not mined.counted(thresholds):
+            elsewhere = "--cross-fit, where the steps are in one memory,"
     if into_mined:
         document = describe_mined(mined, out)
         terminal.print_json(document) if as_json else print_mined(document)
@@ -431,6 +438,22 @@ def _mine_at_a_distance(
         print_notes(notes)
         print_rules(rule_set, out, tried, elsewhere=elsewhere, leeway=leeway)
         print_learner(mined.trees)
+
+
+def _notes_on_forbidding(mined: MinedData) -> list[str]:
+    """What is not known as it is of rules that demand."""
+    notes, steps = [], mined.trees[0].source.steps
+    if len(mined.sample) < steps:
+        notes.append(
+            f"coverage, fidelity and freedom are those of a sample of {len(mined.sample):,} of "
+            f"the {steps:,} steps"
+        )
+    if mined.held_out and any(tree.dimension.n_labels > 2 for tree in mined.trees):
+        notes.append(
+            "what was counted in held-out episodes is left out: it says nothing of rules that "
+            "forbid one of more than two actions; without --never it stands beside each rule"
+        )
+    return notes
 
 
 def _require_no_reading(

@@ -153,8 +153,11 @@ def select_row(row: int | None, key: str) -> None:
     """
     table = st.session_state.get(key)
     rows = _rows(row)
-    if table is not None and (before := list(table["selection"]["rows"])) != rows:
-        st.session_state[key] = {"selection": {"rows": rows}}
+    if table is None or (before := list(table["selection"]["rows"])) == rows:
+        return
+    st.session_state[key] = {"selection": {"rows": rows}}
+    # Said once more it is meant, so its time does not begin anew.
+    if _left(key)[0] != before:
         st.session_state[f"_{key}_left"] = before, monotonic()
 
 
@@ -169,9 +172,19 @@ def rows_selected_anew(key: str, drawn: int | None) -> list[int] | None:
         drawn: The row that it was drawn with, from 0.
     """
     rows = list(st.session_state[key]["selection"]["rows"])
-    left, when = st.session_state.pop(f"_{key}_left", (None, 0.0))
-    late = rows == left and monotonic() - when < _LATE
-    return None if late or rows == _rows(drawn) else rows
+    left, when = _left(key)
+    if rows == left:
+        if monotonic() - when < _LATE:
+            st.session_state[f"_{key}_left"] = left, -_LATE
+            return None
+        del st.session_state[f"_{key}_left"]
+    return None if rows == _rows(drawn) else rows
+
+
+def _left(key: str) -> tuple[list[int] | None, float]:
+    """What was selected in a table before something else was chosen, and when that was."""
+    left: tuple[list[int] | None, float] = st.session_state.get(f"_{key}_left", (None, 0.0))
+    return left
 
 
 def _rows(row: int | None) -> list[int]:

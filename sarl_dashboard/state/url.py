@@ -371,7 +371,7 @@ def _is_absurd(text: str) -> bool:
     return not (math.isfinite(number) and abs(number) <= _MOST)
 
 
-def without(names: Collection[str]) -> dict[str, list[str]]:
+def without(names: Collection[str] = ()) -> dict[str, list[str]]:
     """The URL parameters but for some of them."""
     return {name: st.query_params.get_all(name) for name in st.query_params if name not in names}
 

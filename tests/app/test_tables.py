@@ -40,7 +40,9 @@ def test_what_is_said_late_takes_nothing_back(
     assert state["table"] == selected(1)
     state["table"] = selected(0)  # as the browser had it before it heard of that
     assert rows_selected_anew("table", 1) is None
-    assert rows_selected_anew("table", 1) == [0]  # said again: it was chosen
+    select_row(1, "table")
+    state["table"] = selected(0)  # said again: it was chosen
+    assert rows_selected_anew("table", 1) == [0]
     select_row(1, "table")
     now += 10.0
     state["table"] = selected(0)
@@ -48,3 +50,14 @@ def test_what_is_said_late_takes_nothing_back(
     select_row(1, "table")
     state["table"] = selected(3)
     assert rows_selected_anew("table", 1) == [3]
+
+
+def test_what_is_chosen_by_name_is_not_taken_back(
+    state: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tables, "monotonic", lambda: 100.0)
+    state["table"] = selected(0)
+    select_row(4, "table")  # by its name, which then asks what was selected
+    assert rows_selected_anew("table", 0) == [4]
+    state["table"] = selected(0)
+    assert rows_selected_anew("table", 4) is None

@@ -66,6 +66,8 @@ def test_rules_that_forbid_are_mined_from_its_mined_file(run, mined_file, tmp_pa
     assert answer["freedom"] == leeway_of(rules, sample).freedom
     assert "held_out" not in answer
     assert any("forbid one of more than two actions" in note for note in answer["notes"])
+    run(*command[:4], "--out", out)
+    assert RuleSet.load(out).thresholds.support == 0.001  # as far as the trees go
     run(*command[:4], "--setting", "filtered", "--out", out)
     assert {bool(rule.forbids) for rule in RuleSet.load(out)} == {True, False}
 
@@ -165,7 +167,7 @@ WRONG = {
         "the divider is 5, and",
     ),
     "a depth of any rules": (
-        ["FILE", "--cluster", "local:1", "--max-depth", "3", "--out", "r.mined"],
+        ["FILE", "--cluster", "local:1", "--max-depth", "0", "--out", "r.mined"],
         "--max-depth is about rules",
     ),
     "no cluster": (

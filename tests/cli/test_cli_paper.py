@@ -15,6 +15,7 @@ from sarl_core.cli.app import main
 from sarl_core.paper.report import read_report
 from sarl_core.paper.studies import STUDIES
 from sarl_core.paper.tables import read_table
+from sarl_core.rollouts import episodes
 from tests.paper.test_report import ENTRY
 
 
@@ -123,8 +124,9 @@ def in_nine_digits(content):
 
 
 @pytest.mark.slow
-def test_the_paper_quickly(capsys, tmp_path):
+def test_the_paper_quickly(capsys, tmp_path, monkeypatch):
     """Every study is measured, drawn and judged; only the numbers mean little."""
+    monkeypatch.setattr(episodes, "MAX_STEPS", 100)  # most of the time is the walker's
     folder = tmp_path / "paper"
     assert main(["reproduce", "--quick", "--out", str(folder)]) == 0
     printed = capsys.readouterr()

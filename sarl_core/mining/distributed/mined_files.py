@@ -113,7 +113,11 @@ def load_mined_data(path: str | Path) -> MinedData:
     """
     path = Path(path)
     with naming(str(path)):
-        return read_mined_data(limited_bytes(path))
+        try:
+            content = limited_bytes(path)
+        except FileNotFoundError as error:
+            raise InputError("there is no such file; check its name") from error
+        return read_mined_data(content)
 
 
 def read_mined_data(content: bytes | memoryview) -> MinedData:

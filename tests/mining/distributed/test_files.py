@@ -212,6 +212,7 @@ def test_clusters_that_are_none(
     address: str, sentence: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sarl_core.clusters._SECONDS", 1)
+    monkeypatch.setattr("sarl_core.clusters._START_SECONDS", 10)
     with pytest.raises(InputError, match=sentence), cluster(address):
         pass
 
