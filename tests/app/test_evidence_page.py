@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import time
 from functools import cache
 
+import numpy as np
+import pytest
 from streamlit.testing.v1 import AppTest
 
 from sarl_core import RuleSet, load_demonstrations, mine_rules
@@ -18,6 +21,7 @@ from sarl_core.explaining.words.evidence import (
     verdict_counts,
 )
 from sarl_core.mining.language import share_text
+from sarl_core.mining.rules import FILTERED
 from sarl_core.mining.validation.contradictions import by_episode, find_contradictions
 from sarl_core.mining.validation.cross_fitting import judge
 from sarl_core.mining.validation.episode_counts import count_rules
@@ -29,7 +33,8 @@ from sarl_core.mining.validation.holding_out import (
     verdict,
     with_held_out,
 )
-from tests.app.screens import ROUTER, html, metrics, open_page, texts
+from sarl_core.mining.validation.learning_curve import CurvePoint, learning_curve
+from tests.app.screens import ROUTER, html, metrics, open_page, run_through, texts
 
 CART = ROUTER.parents[1] / "data" / "demonstrations" / "cartpole.parquet"
 HELD = {"data": "cartpole", "holdout": "0.2", "holdout_seed": "3"}
@@ -211,3 +216,18 @@ def test_where_there_is_no_rule_the_page_says_what_to_do() -> None:
     app = open_page("evidence", data="cartpole", support="0.9", confidence="1")
     assert "There is no rule at the present thresholds" in texts(app)
     assert "Nothing has been uploaded" in texts(open_page("evidence", data="upload"))
+
+
+def test_a_learning_curve_is_what_the_library_gives() -> None:
+    # Of few episodes, so that there is little to mine.
+    left_out = [str(episode) for episode in range(24)]
+    few = {"holdout": "0.5", "left_out": ",".join(left_out)}
+    app = open_page("evidence", about="Learning curve", **(HELD | few))
+    run_through(app, "curve")
+    assert "Line: the mean of 6 orders." in texts(app)
+    mined, held_out = hold_out(load_demonstrations(CART).select(range(24, 30)), 0.5, seed=3)
+    expected = learning_curve(mined, FILTERED, held_out=held_out)
+    drawn = [json.loads(chart.proto.spec)["data"][1]["y"] for chart in app.get("plotly_chart")]
+    assert drawn == [
+        pytest.approx(np.nanmean(getattr(expected, layer), axis=0)) for layer in CurvePoint._fields
+    ]

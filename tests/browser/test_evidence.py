@@ -29,13 +29,10 @@ def test_held_out_episodes_are_chosen_and_every_page_follows(screen: Page) -> No
     no_trace(screen)
 
 
-def test_a_learning_curve_is_called_off_and_mined(screen: Page) -> None:
+def test_a_learning_curve_is_called_off(screen: Page) -> None:
     # Long enough that it is not over before a slow browser calls it off.
-    visit(screen, "/evidence?data=bipedal_walker&about=Learning+curve", "Evidence")
+    visit(screen, "/evidence?data=lunar_lander&about=Learning+curve", "Evidence")
     screen.get_by_role("button", name="Run", exact=True).click()
     screen.get_by_role("button", name="Cancel", exact=True).click()
     expect(screen.get_by_text("Cancelled; nothing was kept.")).to_be_visible()
-    visit(screen, "/evidence?data=cartpole&about=Learning+curve", "Evidence")
-    screen.get_by_role("button", name="Run", exact=True).click()
-    expect(screen.get_by_text("Line: the mean of 6 orders.")).to_be_visible(timeout=300_000)
     no_trace(screen)
