@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from sarl_core.serving.limits import VARIABLE, ServerLimits
 
@@ -96,13 +96,23 @@ def chromium() -> Iterator[Browser]:
         browser.close()
 
 
-@pytest.fixture
-def screen(chromium: Browser, address: str) -> Iterator[Page]:
-    """A window of its own for each test; addresses are relative to the dashboard."""
+@pytest.fixture(scope="session")
+def windows(chromium: Browser, address: str) -> Iterator[BrowserContext]:
+    """Where windows are opened: what they all load, as Streamlit's scripts, is loaded once."""
     context = chromium.new_context(
         base_url=address, viewport={"width": 1440, "height": 900}, accept_downloads=True
     )
-    page = context.new_page()
+    yield context
+    context.close()
+
+
+@pytest.fixture
+def screen(windows: BrowserContext) -> Iterator[Page]:
+    """A window of its own for each test; addresses are relative to the dashboard."""
+    page = windows.new_page()
     page.set_default_timeout(PATIENCE)
     yield page
-    context.close()
+    for window in windows.pages:
+        window.close()
+    windows.clear_cookies()  # whoever comes next is another visitor
+    windows.set_offline(False)
