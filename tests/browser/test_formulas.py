@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.walking import metric, no_trace, settle, visit
+from tests.browser.walking import no_trace, settle, visit
 
 FORMULA = "pole_angle + 0.3 * pole_angular_velocity"
 GOOD = f"lean soon [rad] = {FORMULA}"
 
 
 def test_a_formula_is_checked_as_it_is_typed_and_rules_ask_about_it(screen: Page) -> None:
-    visit(screen, "/thresholds?data=cartpole", "Thresholds")
-    before = metric(screen, "Rules")
-    screen.get_by_role("link", name="Names", exact=True).click()
-    expect(screen.get_by_role("heading", name="Names", level=1)).to_be_visible()
-    settle(screen)
+    visit(screen, "/names?data=cartpole", "Names")
     box = screen.get_by_label("Formula", exact=True)
     # No key but those of the text is pressed: what is typed is read when one pauses.
     box.press_sequentially("lean [rad] = pole_angel / 2")
@@ -34,11 +30,6 @@ def test_a_formula_is_checked_as_it_is_typed_and_rules_ask_about_it(screen: Page
     expect(screen.get_by_text(FORMULA, exact=True)).to_be_visible()
     expect(screen.get_by_text("1 formula among the features")).to_be_visible()
     settle(screen)
-
-    screen.get_by_role("link", name="Thresholds", exact=True).click()
-    expect(screen.get_by_role("heading", name="Thresholds", level=1)).to_be_visible()
-    settle(screen)
-    assert metric(screen, "Rules") != before
     screen.get_by_role("link", name="Rules", exact=True).click()
     expect(screen.get_by_text("From the root to the rule")).to_be_visible()
     expect(screen.locator(".sarl-place em").filter(has_text="lean soon").first).to_be_visible()
