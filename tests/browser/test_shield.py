@@ -15,7 +15,7 @@ PATIENCE = 240_000  # milliseconds; the processes that run episodes may have to 
 def test_a_comparison_is_run_changed_downloaded_and_found_again(
     screen: Page, tmp_path: Path
 ) -> None:
-    visit(screen, "/measure?data=cartpole&episodes=4&first_seed=8000", "Measure")
+    visit(screen, "/measure?data=cartpole&episodes=2&first_seed=8000", "Measure")
     expect(screen.get_by_text("press Run")).to_be_visible()
     screen.get_by_role("button", name="Run", exact=True).click()
     expect(screen.get_by_text("all done already")).to_be_visible(timeout=PATIENCE)
@@ -39,7 +39,7 @@ def test_a_comparison_is_run_changed_downloaded_and_found_again(
     assert 0 <= float(rows[2]["flips_per_second"]) <= 50
     # Without the expert: at once, and a link shows the same.
     screen.get_by_text("expert", exact=True).first.click()
-    expect(screen.get_by_text("4 episodes for each of 3 settings")).to_be_visible()
+    expect(screen.get_by_text("2 episodes for each of 3 settings")).to_be_visible()
     settle(screen)
     assert parameters(screen)["agents"] == "novice"
     visit(screen, screen.url, "Measure")
@@ -60,17 +60,4 @@ def test_a_page_that_is_loaded_anew_goes_on_looking_at_its_work(screen: Page) ->
     settle(screen)
     visit(screen, screen.url, "Measure")
     expect(screen.get_by_text("of these 1,000 are done, and Run goes on there")).to_be_visible()
-    no_trace(screen)
-
-
-def test_the_divider_is_studied(screen: Page) -> None:
-    visit(screen, "/thresholds?data=pendulum&details=Divider&divider_episodes=3", "Thresholds")
-    expect(screen.get_by_text("How far an action moves")).to_be_visible()
-    screen.get_by_role("button", name="Run", exact=True).click()
-    expect(screen.get_by_text("all done already")).to_be_visible(timeout=PATIENCE)
-    expect(screen.get_by_text("that row is the expert as it is")).to_be_visible()
-    settle(screen)
-    returns = screen.locator(".js-plotly-plot").filter(has_text="clip")
-    expect(returns.locator(".textpoint")).to_have_count(12)
-    assert parameters(screen)["details"] == "Divider"
     no_trace(screen)
