@@ -176,6 +176,14 @@ def test_many_features_are_searched_and_shown_a_page_at_a_time() -> None:
     matching = [place for place in range(300) if "29" in str(place)]
     assert drawn() == [f"feature {place}" for place in matching[:12]]
     assert len(app.dataframe[-1].value) == len(matching) == 13
+    linked = open_page(
+        "demonstrations",
+        data=app.query_params["data"],
+        feature_search="FEATURE 29 E",
+        feature_page="2",
+    )
+    assert f"**feature {matching[12]}**" in [text.value for text in linked.markdown]
+    assert f"**feature {matching[0]}**" not in [text.value for text in linked.markdown]
     app.text_input(key="feature_search").set_value("no such thing").run()
     assert not app.exception
     assert not drawn()

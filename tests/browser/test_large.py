@@ -36,11 +36,11 @@ def pages(screen: Page) -> Locator:
 def test_thousands_of_rules_are_turned_over_and_the_chosen_one_stays(
     screen: Page, tmp_path: Path
 ) -> None:
-    rng = np.random.default_rng(0)
-    states = rng.normal(size=(7_000, 4)).astype(np.float32)
+    rng = np.random.default_rng(0)  # of what is drawn by chance nearly every state is a rule
+    states = rng.normal(size=(3_000, 2)).astype(np.float32)
     data = upload(
         screen,
-        Demonstrations(states, rng.integers(0, 4, 7_000), np.repeat(np.arange(70), 100)),
+        Demonstrations(states, rng.integers(0, 8, 3_000), np.repeat(np.arange(3), 1_000)),
         tmp_path,
     )
     visit(screen, f"/rules?data={data}&support=0&confidence=1", "Rules")
@@ -53,29 +53,23 @@ def test_thousands_of_rules_are_turned_over_and_the_chosen_one_stays(
     expect(screen.get_by_text(re.compile(r"Rows 2,001 to "))).to_be_visible()
     assert parameters(screen)["rules_page"] == "2"
     assert screen.locator(".st-key-sentence").get_by_role("heading").first.inner_text() == sentence
-    # The link opens the same page.
-    visit(screen, screen.url, "Rules")
-    expect(screen.get_by_text(re.compile(r"Rows 2,001 to "))).to_be_visible()
     # The rule that follows stands on the first one.
     screen.get_by_role("button", name="Next rule").click()
     settle(screen)
     expect(screen.get_by_text(re.compile(r"Rows 1 to 2,000\."))).to_be_visible()
     assert "rules_page" not in parameters(screen)
     assert screen.locator(".st-key-sentence").get_by_role("heading").first.inner_text() != sentence
-    screen.get_by_role("textbox", name="Search").fill("no such thing")
-    screen.get_by_role("textbox", name="Search").press("Enter")
-    expect(screen.get_by_text("No rule matches the search")).to_be_visible()
     no_trace(screen)
 
 
 def test_hundreds_of_features_are_searched_and_turned_over(screen: Page, tmp_path: Path) -> None:
-    states = np.random.default_rng(0).normal(size=(300, 300)).astype(np.float32)
-    data = upload(
+    states = np.random.default_rng(0).normal(size=(60, 300)).astype(np.float32)
+    upload(
         screen,
         Demonstrations(
             states,
             (states[:, 0] > 0).astype(np.int64),
-            np.repeat(np.arange(3), 100),
+            np.repeat(np.arange(3), 20),
             feature_names=[f"sensor {place:03d}" for place in range(300)],
         ),
         tmp_path,
@@ -85,12 +79,6 @@ def test_hundreds_of_features_are_searched_and_turned_over(screen: Page, tmp_pat
     turn(screen, 25)
     expect(title).to_have_text([f"sensor {place}" for place in range(288, 300)])
     assert parameters(screen)["feature_page"] == "25"
-    visit(
-        screen,
-        f"/demonstrations?data={data}&feature_search=sensor+12&feature_page=2",
-        "Demonstrations",
-    )
-    expect(title).to_have_text(["sensor 212"])
     screen.get_by_role("textbox", name="Search for features").fill("007")
     screen.get_by_role("textbox", name="Search for features").press("Enter")
     expect(title).to_have_text(["sensor 007"])

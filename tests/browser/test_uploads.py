@@ -1,4 +1,4 @@
-"""Data as others have them, through the uploader: to rules and to a report."""
+"""Data as others have them, through the uploader: to numbers and to rules."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from tests.demonstrations.test_formats_hubs import lerobot, zipped
 
 
 def upload(screen: Page, *files: tuple[str, bytes]) -> None:
-    visit(screen, "/demonstrations?data=cartpole", "Demonstrations")
-    screen.get_by_text("Use your own demonstrations").click()
+    visit(screen, "/demonstrations?data=upload", "Demonstrations")
     payloads: list[FilePayload] = [
         {"name": name, "mimeType": "application/octet-stream", "buffer": content}
         for name, content in files
@@ -29,23 +28,15 @@ def turn_to(screen: Page, page: str) -> None:
     settle(screen)
 
 
-def make_report(screen: Page) -> None:
-    turn_to(screen, "Report")
-    screen.get_by_role("button", name="Make the report").click()
-    expect(screen.get_by_text("It opens without a network")).to_be_visible(timeout=240_000)
-
-
 def test_a_folder_of_lerobot_as_its_archive(screen: Page, tmp_path: Path) -> None:
     upload(screen, ("push.zip", zipped(lerobot(tmp_path / "push"))))
     expect(screen.get_by_test_id("stMetricValue").first).to_have_text("12")
     assert metric(screen, "Episodes") == "3"
     expect(screen.get_by_text("rules cannot read them").first).to_be_visible()
-    turn_to(screen, "Thresholds")
-    assert int(metric(screen, "Rules")) > 0
     no_trace(screen)
 
 
-def test_several_files_to_a_report(screen: Page) -> None:
+def test_several_files_to_rules(screen: Page) -> None:
     files = [
         (f"run_{number}.csv", "".join(f"{x},{int(x > 7)}\n" for x in range(number, 16)))
         for number in (10, 9, 1)
@@ -53,5 +44,6 @@ def test_several_files_to_a_report(screen: Page) -> None:
     upload(screen, *((name, f"gap,action\n{rows}".encode()) for name, rows in files))
     expect(screen.get_by_test_id("stMetricValue").first).to_have_text("28")
     assert metric(screen, "Episodes") == "3"
-    make_report(screen)
+    turn_to(screen, "Thresholds")
+    assert int(metric(screen, "Rules")) > 0
     no_trace(screen)
