@@ -73,6 +73,8 @@ def test_the_snapped_expert_is_run_on_request() -> None:
         assert found["z"][row] == pytest.approx(
             [episodes.statistics.iqm for episodes in wanted if episodes is not None]
         )
+    assert all(words for row in found["text"] for words in row)
+    assert "that row is the expert as it is" in texts(app)
     # Whoever asks again has it at once; the expert as it is stands on the page Measure too.
     assert len(heatmaps(open_tab(data="pendulum", divider_episodes="2"))) == 2
     shield = open_page(

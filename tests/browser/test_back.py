@@ -6,6 +6,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
+from sarl_core import load_demonstrations, save_demonstrations
 from tests.browser.walking import addresses, no_trace, parameters, settle, visit
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
@@ -64,17 +65,20 @@ def test_thresholds_go_back_on_pages_without_sliders(screen: Page) -> None:
     no_trace(screen)
 
 
-def test_an_upload_is_one_address(screen: Page) -> None:
+def test_an_upload_is_one_address(screen: Page, tmp_path: Path) -> None:
+    few = load_demonstrations(DATA / "pendulum.parquet").select(range(5))
+    path = tmp_path / "few.parquet"
+    save_demonstrations(few, path)
     visit(screen, "/demonstrations?data=cartpole&support=0.01", "Demonstrations")
     before = addresses(screen)
-    screen.locator("input[type=file]").first.set_input_files(DATA / "pendulum.parquet")
-    expect(screen.get_by_test_id("stSidebar").get_by_text("15,000 steps")).to_be_visible()
+    screen.locator("input[type=file]").first.set_input_files(path)
+    expect(screen.get_by_test_id("stSidebar").get_by_text(f"{len(few):,} steps")).to_be_visible()
     screen.wait_for_function("location.search.length > 40")
     settle(screen)
     assert addresses(screen) == before + 1
     go(screen, "Audit")
     before = addresses(screen)
-    screen.locator("input[type=file]").first.set_input_files(DATA / "pendulum.parquet")
+    screen.locator("input[type=file]").first.set_input_files(path)
     screen.wait_for_function("location.search.includes('log=')")
     settle(screen)
     assert addresses(screen) == before + 1

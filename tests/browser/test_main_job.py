@@ -54,19 +54,6 @@ def test_the_chosen_set_is_downloaded(screen: Page, tmp_path: Path) -> None:
         assert len(load_demonstrations(path)) == 15_000
 
 
-def test_a_moved_slider_changes_the_rules(screen: Page) -> None:
-    visit(screen, "/thresholds?data=cartpole", "Thresholds")
-    before = metric(screen, "Rules")
-    slider = screen.get_by_role("slider", name="Minimum confidence")
-    slider.focus()
-    for _ in range(12):
-        slider.press("ArrowLeft")
-    settle(screen)
-    expect(screen.get_by_test_id("stMetricValue").first).not_to_have_text(before)
-    assert float(parameters(screen)["confidence"]) < 0.95
-    no_trace(screen)
-
-
 def test_a_clicked_cell_moves_the_sliders(screen: Page) -> None:
     visit(screen, "/thresholds?data=cartpole", "Thresholds")
     before = metric(screen, "Rules")

@@ -72,7 +72,7 @@ def test_two_people_have_work_and_things_of_their_own(chromium: Browser, server:
     expect(ada.get_by_text("Round 1 of 200").first).to_be_visible()
     begin(ada, LONG + "&round_episodes=11")
     expect(ada.get_by_text("you run 1 job (Improve), as many as one visitor may")).to_be_visible()
-    begin(bob, "/improve?data=cartpole&rounds=2&max_rules=4&round_episodes=6&validation=16")
+    begin(bob, "/improve?data=cartpole&rounds=1&max_rules=4&round_episodes=3&validation=16")
     expect(bob.get_by_text("All done already.")).to_be_visible(timeout=4 * PATIENCE)
     visit(bob, "/library", "Library")
     expect(bob.get_by_text("Ended just now.")).to_be_visible()
