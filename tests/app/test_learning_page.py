@@ -157,6 +157,10 @@ def test_what_is_committed_can_be_shown() -> None:
         assert len(study.seeds) >= 3
         for name in ("outcome", "curves", "afterwards"):
             assert (plan.parent / f"{name}.png").is_file()
+    app = open_page("learning", data="lunar_lander")
+    assert "LunarLander-v3, 3,274 rules" in texts(app)
+    assert len(app.get("plotly_chart")) == 3
+    assert len(app.dataframe) == 1
 
 
 # --- a study of one's own -----------------------------------------------------------------------

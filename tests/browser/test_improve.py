@@ -56,14 +56,8 @@ def test_compact_rules_are_in_force_until_a_threshold_moves(screen: Page) -> Non
     assert metric(screen, "Coverage") == "100 %"
     assert parameters(screen)["set"] == "compact"
     assert screen.evaluate(ring) == "none"
-    # They go along to the rules, and come back as a link.
-    screen.get_by_role("link", name="All rules, with the evidence behind each").click()
-    expect(screen.get_by_text(f"{len(rules)} compact rules")).to_be_visible()
-    settle(screen)
-    visit(screen, "/thresholds?data=lunar_lander&set=compact", "Thresholds")
-    assert metric(screen, "Rules") == str(len(rules))
     slider = screen.get_by_role("slider", name="Minimum confidence")
-    for _ in range(12):
+    for _ in range(3):
         slider.press("ArrowLeft")
     expect(rules_choice(screen)).to_have_value("At the thresholds")
     settle(screen)
@@ -78,4 +72,10 @@ def test_compact_rules_are_in_force_until_a_threshold_moves(screen: Page) -> Non
     expect(rules_choice(screen)).to_have_value("At the thresholds")
     settle(screen)
     assert screen.evaluate(ring) != "none"
+    # They go along to the rules.
+    screen.get_by_role("button", name="Compact", exact=True).click()
+    expect(rules_choice(screen)).to_have_value("Compact rules")
+    settle(screen)
+    screen.get_by_role("link", name="All rules, with the evidence behind each").click()
+    expect(screen.get_by_text(f"{len(rules)} compact rules")).to_be_visible()
     no_trace(screen)

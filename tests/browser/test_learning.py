@@ -1,4 +1,4 @@
-"""Learning in a browser: live curves, stopping, and work that goes on when its page is closed."""
+"""Learning in a browser: live curves, and work that goes on when its page is closed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.walking import PATIENCE, no_trace, settle, visit
+from tests.browser.walking import PATIENCE, no_trace, visit
 
 # No other study has as many steps, so that its process is known by them.
 STEPS = 300_000 + os.getpid() % 100_000
@@ -48,17 +48,11 @@ def test_curves_grow_while_agents_learn_and_what_goes_on_stands_on_library(
     expect(screen.get_by_text("No shield, learner 1:").first).to_be_visible()
     no_trace(screen)
     # Other pages answer meanwhile, and the work goes on.
-    screen.get_by_role("link", name="Thresholds").click()
-    expect(screen.get_by_role("heading", name="Thresholds", level=1)).to_be_visible()
+    screen.get_by_role("link", name="Paper", exact=True).click()
+    expect(screen.get_by_role("heading", name="Paper", level=1)).to_be_visible()
     assert len(at_work()) == 1
-    screen.get_by_role("link", name="Learning").click()
-    stop.click()
-    expect(screen.get_by_text("Stopped.")).to_be_visible()
-    wait_until(0)
-    settle(screen)
-    screen.get_by_role("button", name="Go on").click()
-    wait_until(1)
-    no_trace(screen)
+    screen.get_by_role("link", name="Learning", exact=True).click()
+    expect(stop).to_be_visible()
     other = screen.context.new_page()
     screen.close()  # without a word
     visit(other, "/library", "Library")
@@ -73,12 +67,3 @@ def test_curves_grow_while_agents_learn_and_what_goes_on_stands_on_library(
     work.get_by_role("button", name="Cancel", exact=True).first.click()
     wait_until(0)
     no_trace(other)
-
-
-def test_the_shipped_study_is_shown(screen: Page) -> None:
-    visit(screen, "/learning?data=lunar_lander", "Learning")
-    expect(screen.locator(".js-plotly-plot").first).to_be_visible()
-    expect(screen.get_by_text("LunarLander-v3, 3,274 rules")).to_be_visible()
-    screen.get_by_role("tab", name="All numbers").click()
-    expect(screen.get_by_test_id("stDataFrame")).to_be_visible()
-    no_trace(screen)

@@ -16,7 +16,6 @@ from tests.browser.walking import PATIENCE, metric, no_trace, parameters, settle
 
 
 def upload(screen: Page, name: str, content: bytes) -> None:
-    screen.get_by_text("Use your own demonstrations").click()
     screen.get_by_test_id("stFileUploaderDropzoneInput").set_input_files(
         {"name": name, "mimeType": "text/csv", "buffer": content}
     )
@@ -25,7 +24,7 @@ def upload(screen: Page, name: str, content: bytes) -> None:
 
 
 def test_an_uploaded_csv_is_shown_and_chosen(screen: Page) -> None:
-    visit(screen, "/demonstrations?data=cartpole", "Demonstrations")
+    visit(screen, "/demonstrations?data=upload", "Demonstrations")
     upload(screen, "mine.csv", csv_bytes(*ROWS))
     expect(screen.get_by_test_id("stMetricValue").first).to_have_text("5")
     assert metric(screen, "Episodes") == "2"
@@ -33,25 +32,24 @@ def test_an_uploaded_csv_is_shown_and_chosen(screen: Page) -> None:
     no_trace(screen)
 
 
-def test_a_bad_csv_is_one_sentence_and_the_earlier_set_stays(screen: Page) -> None:
+def test_a_bad_csv_is_one_sentence_and_the_earlier_set_stays_and_is_downloaded(
+    screen: Page, tmp_path: Path
+) -> None:
     visit(screen, "/demonstrations?data=cartpole", "Demonstrations")
+    screen.get_by_text("Use your own demonstrations").click()
     upload(screen, "broken.csv", changed(2, "0,1,0.25,abc,1"))
     alert = screen.get_by_test_id("stAlert")
     expect(alert).to_contain_text("'abc'")
     expect(alert).to_contain_text("row 2")
     assert metric(screen, "Steps") == "15,000"
     assert parameters(screen)["data"] == "cartpole"
-    no_trace(screen)
-
-
-def test_the_chosen_set_is_downloaded(screen: Page, tmp_path: Path) -> None:
-    visit(screen, "/demonstrations?data=cartpole", "Demonstrations")
     for label, extension in (("Parquet", "parquet"), ("CSV", "csv")):
         with screen.expect_download() as started:
             screen.get_by_test_id("stDownloadButton").filter(has_text=label).click()
         path = tmp_path / f"again.{extension}"
         started.value.save_as(path)
         assert len(load_demonstrations(path)) == 15_000
+    no_trace(screen)
 
 
 def test_a_clicked_cell_moves_the_sliders(screen: Page) -> None:
