@@ -1,4 +1,4 @@
-"""The page Paper in a browser: claims, a figure, one of its parts, and a page to take along."""
+"""The page Paper in a browser: a figure, one of its parts, and a page to take along."""
 
 from __future__ import annotations
 
@@ -15,11 +15,8 @@ PAPER = Path(__file__).parents[2] / "data" / "paper"
 
 
 def test_a_figure_is_looked_at_and_taken_along(screen: Page, tmp_path: Path) -> None:
-    visit(screen, "/paper", "Paper")
-    expect(screen.get_by_text("claims of the paper, our numbers agree with")).to_be_visible()
-    screen.get_by_role("radio", name="Figure 2", exact=True).click()
+    visit(screen, "/paper?figure=Figure+2", "Paper")
     expect(screen.get_by_role("heading", name="Figure 2. Number of rules")).to_be_visible()
-    settle(screen)
     expect(screen.locator(".js-plotly-plot")).to_have_count(2)
     screen.get_by_role("radio", name="Bipedal Walker", exact=True).click()
     expect(screen.get_by_text("Number of rules, Bipedal Walker", exact=True)).to_be_visible()
