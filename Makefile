@@ -21,7 +21,7 @@ app: $(VENV)/runtime.stamp  ## start the dashboard
 	$(PYTHON) -m streamlit run app.py --server.port $(PORT)
 
 test: $(VENV)/development.stamp $(BROWSER) $(COMPILER) $(DATABASE)  ## run every test
-	$(PYTHON) -m pytest --numprocesses 2 --dist loadfile
+	$(PYTHON) -m pytest --numprocesses 3 --dist loadfile
 
 lint: $(VENV)/development.stamp  ## style, types, and who may import whom
 	$(PYTHON) -m ruff check .

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-# Two workers have two cores: threads of theirs would wait for each other, spinning. Matrices are
+# Three workers have two cores: threads of theirs would wait for each other, spinning. Matrices are
 # small here, and processes that tests start inherit it.
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 # Each of those processes would compile all that it loads.
