@@ -57,9 +57,8 @@ def test_compact_rules_are_in_force_until_a_threshold_moves(screen: Page) -> Non
     assert parameters(screen)["set"] == "compact"
     assert screen.evaluate(ring) == "none"
     slider = screen.get_by_role("slider", name="Minimum confidence")
-    slider.focus()
     for _ in range(12):
-        screen.keyboard.press("ArrowLeft")
+        slider.press("ArrowLeft")
     expect(rules_choice(screen)).to_have_value("At the thresholds")
     settle(screen)
     screen.wait_for_url(lambda url: "set=" not in url)
