@@ -84,6 +84,7 @@ def test_a_bad_input_is_one_sentence_and_loses_nothing(name: str) -> None:
     assert all(fragment.replace("\\", "") in sentence for fragment in fragments)
     assert metrics(app) == before
     assert app.query_params["data"] == "cartpole"
+    assert "Nothing has changed: the set below is still the one chosen." in texts(app)
 
 
 def test_what_each_column_was_taken_for_is_shown() -> None:
