@@ -62,7 +62,7 @@ _CARTPOLE = Plan(
     2, rounds=24, episodes=10, turns=1, validation=4_000, report=3_000, choose="failures"
 )
 _LANDER = Plan(2, rounds=16, episodes=24, turns=2, validation=512, report=1_000, choose="failures")
-_CONTINUOUS_LANDER = replace(_LANDER, divider=16, max_rules=16)
+_CONTINUOUS_LANDER = replace(_LANDER, divider=16, max_rules=16, search_episodes=8)
 _PENDULUM = Plan(16, rounds=16, episodes=20, divider=16, turns=3, validation=512, report=1_000)
 _BODY = (
     "hull angle, hull angular velocity, horizontal velocity, vertical velocity, hip 1 angle, "
