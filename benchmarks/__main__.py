@@ -8,11 +8,7 @@ import sys
 from collections.abc import Callable, Iterable
 from importlib import import_module
 
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
-
-from benchmarks.measure import Row
+from benchmarks.measure import Row, print_rows
 
 # Where each row is made, in the order of the design.
 ROWS = {
@@ -60,7 +56,6 @@ def main() -> int:
     chosen = options.parse_args()
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
-    console = Console(width=None if sys.stdout.isatty() else 170)
     rows: list[Row] = []
     failed = 0
     for name in chosen.only or ROWS:
@@ -70,7 +65,7 @@ def main() -> int:
         except Exception as error:
             failed += 1
             print(f"error: {name}: {type(error).__name__}: {error}", file=sys.stderr)
-    console.print(_table(rows))
+    print_rows(rows)
     return 1 if failed else 0
 
 
@@ -80,27 +75,6 @@ def _measure(home: str) -> Callable[[bool], Iterable[Row]]:
         import_module(f"benchmarks.{module}"), function
     )
     return found
-
-
-def _table(rows: Iterable[Row]) -> Table:
-    table = Table(box=SIMPLE_HEAD)
-    for heading in ("what", "against"):
-        table.add_column(heading)
-    for heading in ("measured", "to reach"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("", no_wrap=True)
-    table.add_column("behind it", style="dim")
-    for row in rows:
-        limit = ">=" if row.kind == "times faster" else "<="
-        table.add_row(
-            row.what,
-            row.against,
-            row.text(row.measured),
-            f"{limit} {row.text(row.reach)}",
-            "[green]reached[/]" if row.passed else "[red]missed[/]",
-            row.details,
-        )
-    return table
 
 
 if __name__ == "__main__":

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import gc
 import statistics
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
 
 Kind = Literal["times faster", "share", "seconds"]
 
@@ -105,3 +110,25 @@ def duration(value: float) -> str:
         if value >= size:
             return f"{value / size:.3g} {unit}"
     return f"{value / 1e-9:.3g} ns"
+
+
+def print_rows(rows: Iterable[Row]) -> None:
+    """Print the table."""
+    table = Table(box=SIMPLE_HEAD)
+    for heading in ("what", "against"):
+        table.add_column(heading)
+    for heading in ("measured", "to reach"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("", no_wrap=True)
+    table.add_column("behind it", style="dim")
+    for row in rows:
+        limit = ">=" if row.kind == "times faster" else "<="
+        table.add_row(
+            row.what,
+            row.against,
+            row.text(row.measured),
+            f"{limit} {row.text(row.reach)}",
+            "[green]reached[/]" if row.passed else "[red]missed[/]",
+            row.details,
+        )
+    Console(width=None if sys.stdout.isatty() else 170).print(table)

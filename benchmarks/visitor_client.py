@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
 from streamlit.proto.BackMsg_pb2 import BackMsg
 from streamlit.proto.ForwardMsg_pb2 import ForwardMsg
 from websockets.sync.client import connect
+from websockets.typing import Origin, Subprotocol
 
 _LOADING = 120.0  # seconds that a page may take to come
+_TOKEN = "_streamlit_xsrf"  # the cookie without whose word nobody counts as signed in
 _QUIET = 0.3  # seconds after the end of a run in which another may follow it
 
 
@@ -21,7 +24,16 @@ class VisitorClient:
         errors: How many exceptions the page has shown.
     """
 
-    def __init__(self, address: str, page: str, query: str, slider: str) -> None:
+    def __init__(
+        self,
+        address: str,
+        page: str,
+        query: str,
+        slider: str,
+        *,
+        cookies: Mapping[str, str] | None = None,
+        door: Mapping[str, Any] | None = None,
+    ) -> None:
         """Open the page.
 
         Args:
@@ -29,14 +41,23 @@ class VisitorClient:
             page: Its path.
             query: Its parameters.
             slider: The label.
+            cookies: Of a browser in which somebody has signed in.
+            door: How to come to the address, as ``websockets.sync.client.connect`` takes it.
         """
         self.errors = 0
         self._page, self._query, self._label = page, query, slider
         self._id = self._fragment = ""
         self._options: list[str] = []
         socket = address.replace("http", "ws", 1) + "/_stcore/stream"
+        cookies = cookies or {}
+        protocols = ["streamlit", *filter(None, [cookies.get(_TOKEN)])]
         self._connection = connect(
-            socket, subprotocols=["streamlit"], origin=address, max_size=None
+            socket,
+            subprotocols=[Subprotocol(name) for name in protocols],
+            origin=Origin(address),
+            max_size=None,
+            additional_headers={"Cookie": "; ".join(map("=".join, cookies.items()))},
+            **(door or {}),
         )
         self._socket = self._connection.__enter__()
         self._send(self._message())

@@ -30,11 +30,14 @@ def _signed(claims: Mapping[str, Any]) -> str:
 
 
 @contextmanager
-def identity_provider(people: Mapping[str, Mapping[str, object]]) -> Iterator[str]:
+def identity_provider(
+    people: Mapping[str, Mapping[str, object]], host: str = "127.0.0.1"
+) -> Iterator[str]:
     """Serve on a free port.
 
     Args:
         people: By their ids, what the provider says of them.
+        host: Address of this machine to serve at.
 
     Yields:
         Its address.
@@ -44,7 +47,7 @@ def identity_provider(people: Mapping[str, Mapping[str, object]]) -> Iterator[st
     class IdentityHandler(BaseHTTPRequestHandler):
         @property
         def issuer(self) -> str:
-            return f"http://127.0.0.1:{self.server.server_address[1]}"
+            return f"http://{host}:{self.server.server_address[1]}"
 
         def log_message(self, *_: object) -> None:
             pass
@@ -101,10 +104,10 @@ def identity_provider(people: Mapping[str, Mapping[str, object]]) -> Iterator[st
             token = {"access_token": secrets.token_urlsafe(), "token_type": "Bearer"}
             self.answer({**token, "expires_in": 600, "id_token": _signed(claims)})
 
-    server = ThreadingHTTPServer(("127.0.0.1", 0), IdentityHandler)
+    server = ThreadingHTTPServer((host, 0), IdentityHandler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     try:
-        yield f"http://127.0.0.1:{server.server_address[1]}"
+        yield f"http://{host}:{server.server_address[1]}"
     finally:
         server.shutdown()
         server.server_close()

@@ -6,6 +6,8 @@ import re
 import tomllib
 from pathlib import Path
 
+from benchmarks.deployment.container import build_context, steps
+from benchmarks.deployment.machines import variables
 from sarl_core.serving.limits import ServerLimits
 from sarl_core.serving.settings import read_settings
 
@@ -54,3 +56,24 @@ def test_the_secrets_to_fill_in_are_all_that_signing_in_needs() -> None:
     assert set(secrets["auth"]) == {
         *("redirect_uri", "cookie_secret", "client_id", "client_secret", "server_metadata_url"),
     }
+
+
+def test_what_tries_the_example_reads_every_step_of_it(tmp_path: Path) -> None:
+    known = {"DATABASE_PASSWORD": "secret"}
+    compose = variables((DEPLOYMENT / "compose.yaml").read_text(), known)
+    assert "postgresql://sarl:secret@database/sarl" in compose
+    words = [word for word, _ in steps((DEPLOYMENT / "Containerfile").read_text())]
+    assert words.count("FROM") == 2
+    assert words[-1] == "CMD"
+    (tmp_path / "Containerfile").write_text("# Which\nRUN one \\\n && two\n\nUSER sarl\n")
+    assert steps((tmp_path / "Containerfile").read_text()) == [
+        ("RUN", "one   && two"),
+        ("USER", "sarl"),
+    ]
+
+
+def test_what_may_be_copied_is_what_the_list_lets_in(tmp_path: Path) -> None:
+    build_context(ROOT, DEPLOYMENT / "Containerfile.dockerignore", tmp_path / "context")
+    top = {path.name for path in (tmp_path / "context").iterdir()}
+    assert {"app.py", "sarl_core", "pages", ".streamlit"} <= top
+    assert not {"tests", "docs", "CHANGELOG.md", ".git"} & top
