@@ -16,11 +16,17 @@ from threading import Thread
 
 import streamlit as st
 
+from sarl_core.errors import InputError
 from sarl_core.files import temporary_folder
+from sarl_dashboard import providers
 from sarl_dashboard.serving.log_lines import write_json_lines
 from sarl_dashboard.serving.routes import routes
 
 write_json_lines()
+try:
+    providers.are_named()
+except InputError as error:
+    sys.exit(f"error: {error}")
 _while_it_runs = ExitStack()
 _while_it_runs.enter_context(temporary_folder())
 atexit.register(_while_it_runs.close)

@@ -56,7 +56,9 @@ class VisitorClient:
             subprotocols=[Subprotocol(name) for name in protocols],
             origin=Origin(address),
             max_size=None,
-            additional_headers={"Cookie": "; ".join(map("=".join, cookies.items()))},
+            additional_headers=(
+                {"Cookie": "; ".join(map("=".join, cookies.items()))} if cookies else {}
+            ),
             **(door or {}),
         )
         self._socket = self._connection.__enter__()

@@ -39,7 +39,9 @@ _WATCHED = ["[data-testid=stMetricValue]", "[class*=st-key-box_]"]
 def sliders(quick: bool) -> Iterable[Row]:
     """Moves of twenty visitors while rules are improved: one in a browser, the others without."""
     with served() as (browser, address, folder), ExitStack() as opened:
-        begin_work(opened_page(browser, address), address + LONG)
+        worker = opened_page(browser, address)
+        begin_work(worker, address + LONG)
+        worker.context.close()
         page = opened_page(browser, f"{address}/{PAGE}?{QUERY}")
         clients = [
             opened.enter_context(VisitorClient(address, PAGE, QUERY, SLIDER))

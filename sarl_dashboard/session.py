@@ -20,6 +20,7 @@ from streamlit.web.server.starlette.starlette_app_utils import decode_xsrf_token
 from streamlit.web.server.starlette.starlette_server_config import XSRF_COOKIE_NAME
 
 from sarl_core.serving import limits
+from sarl_dashboard import providers
 
 
 @st.cache_resource(show_spinner=False)
@@ -47,12 +48,12 @@ _ONLY_ONE = "the only one"
 
 def needs_sign_in() -> bool:
     """Whether visitors sign in here: whether Streamlit's secrets name who vouches for them."""
-    return hasattr(st.user, "is_logged_in")
+    return providers.are_named() or hasattr(st.user, "is_logged_in")
 
 
 def is_signed_in() -> bool:
     """Whether this visitor has."""
-    return needs_sign_in() and bool(st.user.is_logged_in)
+    return bool(getattr(st.user, "is_logged_in", False))
 
 
 def signed_in() -> str:

@@ -1,6 +1,7 @@
 """``python -m benchmarks.deployment``: build, serve and visit the server of the example.
 
-As root, on Debian with debootstrap, bubblewrap, iproute2, curl, nginx, PostgreSQL and Chromium.
+As root, on Debian with debootstrap, bubblewrap, iproute2, curl, openssl, nginx, PostgreSQL and
+Chromium.
 No container engine is needed: each step of the container file is run in a root of its own.
 """
 
@@ -66,7 +67,8 @@ def _image(work: Path, given: Sequence[str], *, again: bool) -> Image:
     """The image, beginning with Debian's smallest system."""
     context, debian, roots = work / "context", work / "debian", work / "roots"
     if again:
-        shutil.rmtree(work, ignore_errors=True)
+        for made in (context, debian, roots):
+            shutil.rmtree(made, ignore_errors=True)
         roots.mkdir(parents=True)
         subprocess.run(
             ["debootstrap", "--variant=minbase", "bookworm", debian, MIRROR],

@@ -29,7 +29,7 @@ DOMAIN = "sarl.example.org"
 HOST = "10.77.0.1"  # of this machine, on the net that it shares with the three
 ADDRESSES = {"dashboard": "10.77.0.2", "database": "10.77.0.3", "proxy": "10.77.0.4"}
 _BRIDGE = "sarlbridge"
-_POSTGRES = sorted(Path("/usr/lib/postgresql").glob("*/bin"))
+_POSTGRES = Path("/usr/lib/postgresql")
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ def network() -> Iterator[None]:
 
 @contextmanager
 def _database(folder: Path, environment: Mapping[str, str]) -> Iterator[None]:
-    programs = _POSTGRES[-1]
+    programs = max(_POSTGRES.glob("*/bin"), key=lambda path: int(path.parent.name))
     data, password = folder / "database", folder / "password"
     as_postgres = ["setpriv", "--reuid", "postgres", "--regid", "postgres", "--init-groups"]
     data.mkdir()

@@ -238,6 +238,7 @@ def _many(
         at_work, sessions = (metric(_DIRECT, f"sarl_{one}") for one in ("jobs_running", "sessions"))
         memory = metric(_DIRECT, "sarl_memory_bytes")
         errors = sum(client.errors for client in clients)
+        errors += page.get_by_test_id("stException").count()
     page.close()
     assert sessions >= VISITORS, f"only {sessions} of {VISITORS} pages are open"
     _seen(f"{sessions:.0f} pages open, {at_work:.0f} job, {memory / 1e6:,.0f} MB in all processes")

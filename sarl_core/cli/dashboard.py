@@ -70,11 +70,9 @@ def app(
     Example: `python -m sarl_core app --port 8600`
     """
     from sarl_core.serving.limits import VARIABLE as LIMITS
-    from sarl_core.serving.settings import check_secrets
 
     script = _script()
     with terminal.working("Starting"):
-        check_secrets((Path.home(), Path.cwd()))
         said = _settings(settings)
         offers = _offers(
             env or [], env_args, wrapper or [], failure, cost, agent or [], said.offers

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -102,30 +102,6 @@ def read_settings(path: Path) -> ServerSettings:
         tuple(settings.agents.items()),
     )
     return ServerSettings(offers, limits, for_many="limits" in document)
-
-
-def check_secrets(folders: Sequence[Path]) -> None:
-    """Refuse secrets that cannot be read, before visitors meet that.
-
-    Args:
-        folders: Where Streamlit looks for ``.streamlit/secrets.toml``.
-
-    Raises:
-        InputError: If one is there and cannot be read.
-    """
-    for folder in folders:
-        path = folder / ".streamlit" / "secrets.toml"
-        try:
-            tomllib.loads(path.read_bytes().decode())
-        except FileNotFoundError:
-            continue
-        except (OSError, ValueError) as error:
-            reason = (isinstance(error, OSError) and error.strerror) or error
-            raise InputError(
-                f"the secrets {path} cannot be read ({reason}); write them as "
-                "examples/deployment/secrets.example.toml shows, readable for the user who runs "
-                "the dashboard"
-            ) from error
 
 
 def _with_room_for_others(limits: ServerLimits, document: Mapping[str, Any]) -> ServerLimits:

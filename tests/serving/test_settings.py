@@ -8,7 +8,7 @@ import pytest
 
 from sarl_core import InputError
 from sarl_core.serving.limits import VARIABLE, ServerLimits
-from sarl_core.serving.settings import check_secrets, read_settings
+from sarl_core.serving.settings import read_settings
 
 LIMITS = """
 [agents]
@@ -87,20 +87,3 @@ def test_a_mistake_in_json_is_named_with_its_line_too(tmp_path: Path) -> None:
     text = '{\n "limits": {\n  "jobs": "four"\n }\n}'
     with pytest.raises(InputError, match="line 3: 'jobs' is 'four'"):
         read_settings(written(tmp_path, text, "server.json"))
-
-
-def test_secrets_that_cannot_be_read_are_told_before_visitors_meet_them(tmp_path: Path) -> None:
-    secrets = tmp_path / ".streamlit" / "secrets.toml"
-    check_secrets([tmp_path, tmp_path / "nowhere"])
-    secrets.parent.mkdir()
-    secrets.write_text('[auth]\nclient_id = "dashboard"\n')
-    check_secrets([tmp_path])
-    secrets.write_text("[auth]\nclient_id = dashboard\n")
-    with pytest.raises(
-        InputError, match=r"secrets\.toml cannot be read \(.*line 2.*\); write them"
-    ):
-        check_secrets([tmp_path])
-    secrets.unlink()
-    secrets.mkdir()
-    with pytest.raises(InputError, match=r"secrets\.toml cannot be read \(Is a directory\)"):
-        check_secrets([tmp_path])

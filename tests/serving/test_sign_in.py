@@ -210,5 +210,5 @@ def test_who_may_come_from_elsewhere_is_told_apart(
 def test_what_is_said_to_a_provider_is_no_provider(
     monkeypatch: pytest.MonkeyPatch, auth: dict[str, Any], names: list[str]
 ) -> None:
-    monkeypatch.setattr(sign_in.st, "secrets", {"auth": auth})
+    monkeypatch.setattr(sign_in.providers, "section", lambda: auth)
     assert sign_in._providers() == names

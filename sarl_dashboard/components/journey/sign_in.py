@@ -11,7 +11,7 @@ from threading import Lock
 import streamlit as st
 from streamlit.errors import StreamlitAuthError
 
-from sarl_dashboard import session
+from sarl_dashboard import providers, session
 from sarl_dashboard.text import escaped, refuse
 
 _MOST_LINKS = 1_000  # of people who are about to sign in
@@ -109,6 +109,6 @@ def _sign_in(provider: str) -> None:
 def _providers() -> list[str]:
     """The names of those who vouch for visitors; "" for the only one, which needs none."""
     # Beside them may stand a table of what is said to the only one, which is no provider.
-    sections = dict(st.secrets["auth"])
+    sections = dict(providers.section())
     sections.pop("client_kwargs", None)
     return [name for name, value in sections.items() if isinstance(value, Mapping)] or [""]
