@@ -140,13 +140,13 @@ def _of_rule(
     undemonstrated = rule.origin == "manual" or not dimension.is_interval
     if projection == "expert" and rule.demonstrated_value is None and not undemonstrated:
         raise InputError(
-            f"the rule {rule.id} holds no demonstrated value, which the projection 'expert' needs; "
-            "mine the rules again, or choose centre or clip"
+            f"a rule for {dimension.label_names[rule.action][:60]} holds no demonstrated value, "
+            "which the projection 'expert' needs; mine the rules again, or choose centre or clip"
         )
     entry = _of_label(rule.action, dimension, projection, dtype, rule.demonstrated_value)
     if rule.enabled and not entry[1] <= entry[2]:
         raise InputError(
-            f"rule {rule.id} asks for {dimension.label_names[rule.action][:60]}, and no number "
+            f"a rule asks for {dimension.label_names[rule.action][:60]}, and no number "
             f"of the kind that the environment takes ({dtype}) lies there; mine with a smaller "
             "divider"
         )

@@ -112,7 +112,11 @@ def matching(listed: Listed, in_force: InForce) -> Places:
             width=220,
             label_visibility="collapsed",
         )
-        tried = compact is None and tried_on() is not None
+        tried = (
+            compact is None
+            and tried_on() is not None
+            and any(rule.held_out is not None for rule in rule_set)
+        )
         least = lower_bound_choice() if tried else 0.0
         matches = listed.lower >= least
         sure = int(np.count_nonzero(matches))
