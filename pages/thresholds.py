@@ -48,10 +48,7 @@ combinations_choice()
 display = chosen_display(trees, compact, tried_on())
 thresholds = chosen_thresholds()
 landscape = display.landscape(thresholds)
-if display.surfaces:
-    show_surfaces(display, landscape, thresholds)
-else:
-    show_maps(display, landscape)
+maps = st.container()
 # The best trade-offs are those of coverage and fidelity, and rules that forbid want freedom, too.
 names = [LARGEST, *([] if forbids else [TRADE_OFFS]), *([DIVIDER] if display.is_divided else [])]
 tabs = dict(
@@ -68,4 +65,9 @@ else:
     table = tabs[LARGEST].empty()
 with top:
     show_controls(display, landscape, table)
+with maps:  # after the numbers, for which a browser would else wait until it has drawn these
+    if display.surfaces:
+        show_surfaces(display, landscape, thresholds)
+    else:
+        show_maps(display, landscape)
 cross_fitting.make_ready()
