@@ -37,21 +37,21 @@ def paths_of(learner, observations, labels):
 
 
 def measures(rows, labels):
-    """Support, confidence, lift and label of a node, as fractions."""
-    here = labels[rows].tolist()
-    best = min(set(here), key=lambda label: (-here.count(label), label))
-    support = Fraction(len(here), len(labels))
-    confidence = Fraction(here.count(best), len(here))
-    share = Fraction(labels.tolist().count(best), len(labels))
-    return support, confidence, confidence / share, best
-
-
-def algorithm_1(paths, labels, supp_min, conf_min, lift_min=0.0, max_depth=None, known=None):
-    """The set of (conditions, label, samples, correct) that Algorithm 1 returns.
+    """Support, confidence, lift, label and number of steps of that label, of a node.
 
     Measures are compared as floats, which is how thresholds are given; a quotient of whole
     numbers becomes the float nearest to it.
     """
+    here = labels[rows].tolist()
+    best = min(set(here), key=lambda label: (-here.count(label), label))
+    support = Fraction(len(here), len(labels))
+    confidence = Fraction(here.count(best), len(here))
+    share = Fraction(np.count_nonzero(labels == best), len(labels))
+    return float(support), float(confidence), float(confidence / share), best, here.count(best)
+
+
+def algorithm_1(paths, labels, supp_min, conf_min, lift_min=0.0, max_depth=None, known=None):
+    """The set of (conditions, label, samples, correct) that Algorithm 1 returns."""
     known = {} if known is None else known
     filtered_paths = set()
     for path in paths:
@@ -60,13 +60,9 @@ def algorithm_1(paths, labels, supp_min, conf_min, lift_min=0.0, max_depth=None,
                 break
             if queries not in known:
                 known[queries] = measures(rows, labels)
-            support, confidence, lift, label = known[queries]
-            if (
-                float(support) >= supp_min
-                and float(confidence) >= conf_min
-                and float(lift) >= lift_min
-            ):
-                filtered_paths.add((queries, label, len(rows), round(confidence * len(rows))))
+            support, confidence, lift, label, correct = known[queries]
+            if support >= supp_min and confidence >= conf_min and lift >= lift_min:
+                filtered_paths.add((queries, label, len(rows), correct))
                 break
     return filtered_paths
 
