@@ -21,6 +21,7 @@ SHIPPED = {
     "lunar_lander_combined.json": ("LunarLander-v3", 24, 265.0),
     "lunar_lander_few_combined.json": ("LunarLander-v3", 8, 240.0),
     "lunar_lander_compact.json": ("LunarLander-v3", 48, 200.0),
+    "lunar_lander_continuous_combined.json": ("LunarLanderContinuous-v3", 16, 240.0),
     "pendulum_combined.json": ("Pendulum-v1", 16, -175.0),
     "bipedal_walker_compact.json": ("BipedalWalker-v3", 128, 250.0),
     "driving_compact.json": ("Driving-v0", 24, 22.0),
@@ -105,6 +106,7 @@ def test_few_rules_achieve_what_the_guide_says_of_them() -> None:
         ("cartpole_combined", 2, 500.0, 0.0013),
         ("lunar_lander_few_combined", 8, 240.0, 0.04),
         ("lunar_lander_combined", 24, 270.0, 0.02),
+        ("lunar_lander_continuous_combined", 16, 259.0, 0.02),
     ):
         middle = median(known[name])
         assert middle["rules"] <= rules
