@@ -24,7 +24,7 @@ from sarl_dashboard.serving.routes import routes
 
 write_json_lines()
 try:
-    providers.are_named()
+    providers.check()
 except InputError as error:
     sys.exit(f"error: {error}")
 _while_it_runs = ExitStack()

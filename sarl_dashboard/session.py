@@ -48,12 +48,20 @@ _ONLY_ONE = "the only one"
 
 def needs_sign_in() -> bool:
     """Whether visitors sign in here: whether Streamlit's secrets name who vouches for them."""
-    return providers.are_named() or hasattr(st.user, "is_logged_in")
+    return providers.are_named() or _is_logged_in() is not None
 
 
 def is_signed_in() -> bool:
     """Whether this visitor has."""
-    return bool(getattr(st.user, "is_logged_in", False))
+    return bool(_is_logged_in())
+
+
+def _is_logged_in() -> bool | None:
+    """As Streamlit has it; None where nobody signs in, or the secrets are not to be read."""
+    try:
+        return getattr(st.user, "is_logged_in", None)
+    except (OSError, ValueError):
+        return None
 
 
 def signed_in() -> str:

@@ -43,6 +43,7 @@ PUBLISHED = {
         (PublishedPoint(94, 245.0, COSTA), "245 ± 40.5", "–"),
     ),
 }
+EACH = {"lunar_lander_continuous": " for each engine", "bipedal_walker": " for each joint"}
 LANDING = ("lunar_lander", "lunar_lander_continuous")  # of which 200 counts as solved
 IN_FULL = {
     "cartpole_combined": "The rules of Cart Pole:",
@@ -108,7 +109,8 @@ def compact_table(known: dict[str, list[dict[str, Any]]], *, every_seed: bool) -
             features = "two" if SETS[name].combine else "one"
             every = ", ".join(map(seed_text, sorted(seeds, key=lambda one: int(one["seed"]))))
             achieved = outcome_cells(task, chosen)
-            rows.append([title, str(chosen["rules"]), features, *achieved, every])
+            rules = f"{chosen['rules']}{EACH.get(task, '')}"
+            rows.append([title, rules, features, *achieved, every])
         if sets:
             for point, mean, solved in PUBLISHED.get(task, ()):
                 rows.append([f"*{point.name}*", str(point.rules), "one", mean, solved, "–", "–"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
+from threading import Event
 
 import pytest
 from streamlit import config
@@ -13,66 +13,108 @@ from sarl_core import InputError
 from sarl_dashboard import providers, session
 from sarl_dashboard.components.journey import sign_in
 
-PROVIDER = '[auth]\nclient_id = "dashboard"\n'
+SECRET = "0123456789abcdef" * 4
+PROVIDER = f'[auth]\nclient_id = "dashboard"\ncookie_secret = "{SECRET}"\n'
 
 
 @pytest.fixture
-def secrets(tmp_path: Path) -> Iterator[Path]:
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Where the secrets are looked for: a file, and whatever a test names beside it."""
     before = config.get_option("secrets.files")
-    path = tmp_path / "secrets.toml"
-    config.set_option("secrets.files", [str(tmp_path / "nowhere.toml"), str(path)])
-    forget()
-    yield path
+    monkeypatch.setattr(providers, "_named", Event())
+    look(tmp_path / "nowhere.toml", tmp_path / "secrets.toml")
+    yield tmp_path
     config.set_option("secrets.files", before)
-    forget()
-
-
-def forget() -> None:
-    providers.are_named.cache_clear()
     providers.st.secrets._reset()
 
 
-def test_who_is_named_vouches_for_visitors(secrets: Path) -> None:
+def look(*places: Path) -> None:
+    config.set_option("secrets.files", [str(place) for place in places])
+    providers.st.secrets._reset()
+
+
+def test_who_is_named_vouches_for_visitors_from_then_on(folder: Path) -> None:
+    providers.check()
     assert not providers.are_named()
-    secrets.write_text(PROVIDER)
-    assert not providers.are_named()  # it is the start that decides
-    forget()
-    assert providers.are_named()
-    forget()
+    secrets = folder / "secrets.toml"
     secrets.write_text('password = "of something else"\n')
+    providers.check()
     assert not providers.are_named()
+    for text, count in ((PROVIDER, 2), ("", 0), ("[auth", 0)):
+        secrets.write_text(text)
+        providers.st.secrets._reset()
+        assert len(providers.section()) == count
+        assert providers.are_named()
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    ("content", "sentence"),
     [
-        ("[auth", r"secrets\.toml cannot be read \(Expected .*\); let whoever runs"),
-        ("[auth]\n", r"'auth' in the secrets .*secrets\.toml names nobody; the guide"),
-        ("auth = 3\n", r"'auth' in the secrets .* names nobody"),
+        (b"[auth", r"the secrets cannot be read \(.*secrets\.toml: Expected.*\); let whoever"),
+        (b"\xff", r"the secrets cannot be read \(.*utf-8.*\); let whoever"),
+        (b"[auth]\n", "'auth' in the secrets names nobody; the guide"),
+        (b"auth = 3\n", "'auth' in the secrets names nobody"),
+        (b"[[auth]]\nclient_id = 'x'\n", "'auth' in the secrets names nobody"),
+        (b"[auth]\nclient_id = 'x'\n", "'cookie_secret' in the secrets is none, and who knows"),
+        (b"[auth]\ncookie_secret = ''\n", "'cookie_secret' in the secrets is none"),
+        (
+            b"[auth]\ncookie_secret = 'what this prints: openssl rand -hex 32'\n",
+            "'cookie_secret' in the secrets is none",
+        ),
     ],
 )
-def test_secrets_that_name_nobody_are_refused_at_the_start(
-    secrets: Path, text: str, sentence: str
+def test_secrets_that_do_not_do_are_refused_at_the_start(
+    folder: Path, content: bytes, sentence: str
 ) -> None:
-    secrets.write_text(text)
+    (folder / "secrets.toml").write_bytes(content)
     with pytest.raises(InputError, match=sentence):
-        providers.are_named()
+        providers.check()
 
 
-def test_a_folder_in_their_place_is_refused(secrets: Path) -> None:
-    secrets.mkdir()  # as engines make where the file to be mounted is not there
-    with pytest.raises(InputError, match=r"cannot be read \(Is a directory\)"):
-        providers.are_named()
+def test_places_that_cannot_be_read_are_refused_at_the_start(folder: Path) -> None:
+    good = folder / "secrets.toml"
+    good.write_text(PROVIDER)
+    providers.check()
+    other = folder / "other.toml"
+    other.mkdir()  # as engines make where the file to be mounted is not there
+    plain = folder / "sarl"
+    plain.write_text(PROVIDER)
+    for place in (other, plain, folder / "not there"):
+        look(good, place)
+        with pytest.raises(InputError, match="the secrets cannot be read"):
+            providers.check()
 
 
+def test_a_folder_of_secrets_names_somebody_or_is_refused(folder: Path) -> None:
+    place = folder / "kubernetes"
+    provider = place / "auth"
+    provider.mkdir(parents=True)
+    look(place)
+    with pytest.raises(InputError, match="the secrets cannot be read"):
+        providers.check()
+    (provider / "client_id").write_text("dashboard")
+    look(place)
+    with pytest.raises(InputError, match="names nobody"):  # a single file is no table
+        providers.check()
+    (provider / "cookie_secret").write_text(SECRET)
+    look(place)
+    providers.check()
+    assert providers.are_named()
+
+
+@pytest.mark.parametrize("content", [b"[auth", b"\xff", b"auth = 3\n", b"", None])
 def test_nobody_comes_in_when_they_break_while_the_server_runs(
-    secrets: Path, monkeypatch: pytest.MonkeyPatch
+    folder: Path, content: bytes | None
 ) -> None:
+    secrets = folder / "secrets.toml"
     secrets.write_text(PROVIDER)
     assert providers.are_named()
-    secrets.write_text("[auth")
+    if content is None:
+        secrets.unlink()
+        secrets.mkdir()
+    else:
+        secrets.write_bytes(content)
     providers.st.secrets._reset()
-    monkeypatch.setattr(session.st, "user", SimpleNamespace())  # as it then is
     assert session.needs_sign_in()
     assert not session.is_signed_in()
     assert not sign_in.is_admitted()
