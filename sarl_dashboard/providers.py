@@ -20,7 +20,7 @@ _named = Event()  # never taken back: what was closed once opens for nobody
 
 
 def check() -> None:
-    """Refuse secrets that do not say what they should, before anybody is served.
+    """Take in who is named before anybody is served, or refuse the secrets.
 
     Streamlit goes on without secrets that it cannot read, and would let everybody in.
 
@@ -48,6 +48,7 @@ def check() -> None:
             "'cookie_secret' in the secrets is none, and who knows it can sign in as anybody; "
             "write there what `openssl rand -hex 32` prints"
         )
+    _named.set()
 
 
 def are_named() -> bool:

@@ -48,20 +48,15 @@ _ONLY_ONE = "the only one"
 
 def needs_sign_in() -> bool:
     """Whether visitors sign in here: whether Streamlit's secrets name who vouches for them."""
-    return providers.are_named() or _is_logged_in() is not None
+    return providers.are_named()
 
 
 def is_signed_in() -> bool:
     """Whether this visitor has."""
-    return bool(_is_logged_in())
-
-
-def _is_logged_in() -> bool | None:
-    """As Streamlit has it; None where nobody signs in, or the secrets are not to be read."""
     try:
-        return getattr(st.user, "is_logged_in", None)
-    except (OSError, ValueError):
-        return None
+        return bool(getattr(st.user, "is_logged_in", False))
+    except (OSError, ValueError):  # of secrets that became unreadable
+        return False
 
 
 def signed_in() -> str:

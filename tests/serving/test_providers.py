@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from threading import Event
@@ -13,6 +16,7 @@ from sarl_core import InputError
 from sarl_dashboard import providers, session
 from sarl_dashboard.components.journey import sign_in
 
+ROOT = Path(__file__).resolve().parents[2]
 SECRET = "0123456789abcdef" * 4
 PROVIDER = f'[auth]\nclient_id = "dashboard"\ncookie_secret = "{SECRET}"\n'
 
@@ -108,7 +112,7 @@ def test_nobody_comes_in_when_they_break_while_the_server_runs(
 ) -> None:
     secrets = folder / "secrets.toml"
     secrets.write_text(PROVIDER)
-    assert providers.are_named()
+    providers.check()  # and nobody has come yet when it breaks
     if content is None:
         secrets.unlink()
         secrets.mkdir()
@@ -119,3 +123,20 @@ def test_nobody_comes_in_when_they_break_while_the_server_runs(
     assert not session.is_signed_in()
     assert not sign_in.is_admitted()
     assert sign_in._providers() == [""]
+
+
+def test_the_dashboard_does_not_start_with_secrets_that_do_not_do(tmp_path: Path) -> None:
+    secrets = tmp_path / ".streamlit" / "secrets.toml"
+    secrets.parent.mkdir()
+    secrets.write_text("[auth]\n")
+    done = subprocess.run(
+        [sys.executable, "-m", "streamlit", "run", "app.py", "--server.port", "0"],
+        cwd=ROOT,
+        env=os.environ | {"HOME": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 1
+    assert "error: 'auth' in the secrets names nobody" in done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
