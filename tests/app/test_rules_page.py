@@ -214,3 +214,10 @@ def test_the_sidebar_says_what_is_in_force() -> None:
 
 def test_without_an_upload_the_page_says_what_to_do() -> None:
     assert "Nothing has been uploaded" in texts(open_page("rules", data="upload"))
+
+
+def test_a_lower_bound_is_only_offered_where_rules_have_one() -> None:
+    without = open_page("rules", data="cartpole")
+    assert not without.number_input
+    held_out = open_page("rules", data="cartpole", holdout="0.2")
+    assert [one.label for one in held_out.number_input] == ["Lower bound at least"]

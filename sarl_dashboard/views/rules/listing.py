@@ -22,7 +22,7 @@ from sarl_dashboard.components.journey.words import with_words
 from sarl_dashboard.components.lists.rule_search import have_word, names_have_word
 from sarl_dashboard.components.settings import search_box
 from sarl_dashboard.components.tables import frame
-from sarl_dashboard.state.mined import episodes_tried_on, tried_on
+from sarl_dashboard.state.mined import episodes_tried_on
 from sarl_dashboard.text import in_full
 from sarl_dashboard.views.rules.in_force import InForce
 
@@ -112,11 +112,7 @@ def matching(listed: Listed, in_force: InForce) -> Places:
             width=220,
             label_visibility="collapsed",
         )
-        tried = (
-            compact is None
-            and tried_on() is not None
-            and any(rule.held_out is not None for rule in rule_set)
-        )
+        tried = compact is None and any(rule.held_out is not None for rule in rule_set)
         least = lower_bound_choice() if tried else 0.0
         matches = listed.lower >= least
         sure = int(np.count_nonzero(matches))
