@@ -80,7 +80,8 @@ def built(
         The last stage.
 
     Raises:
-        RuntimeError: If a step fails or is of a kind that is not known here.
+        CalledProcessError: If a step fails.
+        RuntimeError: If one is of a kind that is not known here.
     """
     stages = dict[str, Image]()
     image: Image | None = None

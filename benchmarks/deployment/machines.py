@@ -16,7 +16,7 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -112,9 +112,7 @@ def deployed(example: Path, image: Image, folder: Path, secrets: str) -> Iterato
         "127.0.0.1 localhost\n" + "".join(f"{at} {name}\n" for name, at in names.items())
     )
     deployment = Deployment(folder, image, compose["services"]["dashboard"], authority)
-    with ExitStack() as running:
-        running.enter_context(_database(folder, compose["services"]["database"]["environment"]))
-        running.enter_context(_proxy(folder))
+    with _database(folder, compose["services"]["database"]["environment"]), _proxy(folder):
         yield deployment
 
 
