@@ -62,7 +62,7 @@ def main(jobs: int) -> None:
             *((count, pairs) for count in two),
         ]:
             if any(
-                (point["budget"], point.get("combined")) == (budget, bool(combined))
+                (point["budget"], point["combined"]) == (budget, bool(combined))
                 for point in points
             ):
                 continue
@@ -81,7 +81,7 @@ def main(jobs: int) -> None:
                     **card["reported"],
                 }
             )
-            points.sort(key=lambda point: (bool(point["combined"]), int(point["budget"])))
+            points.sort(key=lambda point: (point["combined"], point["budget"]))
             with whole_file(OUT) as unfinished:
                 unfinished.write_text(json.dumps(known, indent=1) + "\n")
             print(name, budget, bool(combined), card["reported"], flush=True)
