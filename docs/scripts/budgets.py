@@ -62,8 +62,7 @@ def main(jobs: int) -> None:
             *((count, pairs) for count in two),
         ]:
             if any(
-                (point["budget"], point["combined"]) == (budget, bool(combined))
-                for point in points
+                (point["budget"], point["combined"]) == (budget, bool(combined)) for point in points
             ):
                 continue
             aggregation = aggregate(
