@@ -44,6 +44,19 @@ WATCH = """
 }
 """
 
+# When the four numbers stood on screen. Whoever asks from outside looks twice a second only.
+FIRST_NUMBERS = """
+window.numbers = new Promise(done => {
+  const watch = new MutationObserver(() => {
+    const four = [...document.querySelectorAll('[data-testid=stMetricValue]')];
+    if (four.length < 4 || four.some(one => one.innerText === '')) return;
+    watch.disconnect();
+    requestAnimationFrame(() => setTimeout(() => done(Date.now() / 1000)));
+  });
+  watch.observe(document, {subtree: true, childList: true, characterData: true});
+});
+"""
+
 
 def slider(quick: bool) -> Iterable[Row]:
     """Moves of the slider of support, at the shipped size and at a million steps."""
@@ -69,12 +82,12 @@ def cold_start(quick: bool) -> Iterable[Row]:
         for _ in range(2 if quick else 5):
             page = browser.new_page(viewport={"width": 1440, "height": 900})
             page.set_default_timeout(PATIENCE)
+            page.add_init_script(FIRST_NUMBERS)
             with tempfile.TemporaryDirectory() as name:
-                started = time.perf_counter()
+                started = time.time()
                 with dashboard(Path(name)) as address:
                     page.goto(f"{address}/thresholds")
-                    page.get_by_test_id("stMetricValue").nth(3).wait_for()
-                    times.append(time.perf_counter() - started)
+                    times.append(page.evaluate("() => window.numbers") - started)
             page.close()
     yield Row(
         "cold start to the first numbers on Thresholds",

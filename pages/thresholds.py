@@ -21,7 +21,11 @@ from sarl_dashboard.views.thresholds.combinations import combinations_choice
 from sarl_dashboard.views.thresholds.controls import mode_choice, show_controls
 from sarl_dashboard.views.thresholds.display import DIVIDER, LARGEST, TRADE_OFFS, chosen_display
 from sarl_dashboard.views.thresholds.divider import show_divider
-from sarl_dashboard.views.thresholds.maps import show_maps, show_surfaces
+from sarl_dashboard.views.thresholds.maps import (
+    let_numbers_be_drawn,
+    show_maps,
+    show_surfaces,
+)
 from sarl_dashboard.views.thresholds.moves import take_over
 from sarl_dashboard.views.thresholds.trade_offs import show_trade_offs
 
@@ -65,7 +69,8 @@ else:
     table = tabs[LARGEST].empty()
 with top:
     show_controls(display, landscape, table)
-with maps:  # after the numbers, for which a browser would else wait until it has drawn these
+let_numbers_be_drawn()
+with maps:
     if display.surfaces:
         show_surfaces(display, landscape, thresholds)
     else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import streamlit as st
@@ -17,6 +18,17 @@ from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.moves import take_click
 
 BARE = {"displayModeBar": False, "scrollZoom": False}
+_A_FEW_FRAMES = 0.15  # seconds
+
+
+def let_numbers_be_drawn() -> None:
+    """Wait, at the first visit of a session, until a browser has drawn what it was sent.
+
+    What draws maps takes it more than half a second to read, in which it draws nothing else.
+    """
+    if not st.session_state.setdefault("_numbers_drawn", False):
+        time.sleep(_A_FEW_FRAMES)
+        st.session_state["_numbers_drawn"] = True
 
 
 def show_maps(display: Display, landscape: Landscape | NeverLandscape) -> None:
