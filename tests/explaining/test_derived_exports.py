@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -200,3 +201,29 @@ def test_rules_without_derived_features_are_exported_as_before() -> None:
     plain = mine_rules(made.deriving(()), supp_min=0.01, conf_min=0.9)
     assert "contract" not in rules_to_c(plain)
     assert "derive" not in rules_to_python(plain)
+
+
+@pytest.mark.parametrize("formulas", [False, True])
+def test_the_vectors_tell_a_comparison_that_is_turned_round_or_misses_its_threshold(
+    formulas: bool,
+) -> None:
+    rule_set = mined(continuous=False, formulas=formulas)
+    vectors = make_vectors(rule_set)
+    valid = ~vectors.invalid
+    code = rules_to_python(rule_set)
+    queries = list(re.finditer(r"if x\[(\d+)\] <= (-?[\d.e+-]+):", code))
+    assert len(queries) > 10
+
+    def is_seen(query: re.Match[str], comparison: str, threshold: float) -> bool:
+        other = f"if x[{query[1]}] {comparison} {threshold!r}:"
+        names: dict[str, Any] = {}
+        exec(code[: query.start()] + other + code[query.end() :], names)
+        rows = zip(vectors.states[valid], vectors.proposed[valid], strict=True)
+        rules = [names["shield"](state.tolist(), int(action[0]))[1] for state, action in rows]
+        return bool((np.array(rules) != vectors.rules[valid]).any())
+
+    turned = [is_seen(query, ">", float(query[2])) for query in queries]
+    moved = [is_seen(query, "<=", float(query[2]) * 1.1) for query in queries]
+    assert all(turned)
+    # Some rules lie nowhere at the threshold of a query on the way to them.
+    assert np.mean(moved) > 0.7

@@ -1,26 +1,29 @@
 """States whose derived features lie at a threshold and one float32 step beside it.
 
 What is derived follows from several features at once, so such a state has to be looked for: among
-states that are led along the way to the query as well as may be, two on either side of the
-threshold are drawn together until they differ by one step of one feature. Of a combination both
-features are then moved by a few steps, which reaches the threshold itself and its neighbours
+states on the way to the query (`PathInterior`; where there are none, among any), two on either side
+of the threshold are drawn together until they differ by one step of one feature. Of a combination
+both features are then moved by a few steps, which reaches the threshold itself and its neighbours
 wherever there are float32 numbers for it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Feature, observed_features
 from sarl_core.demonstrations.derived import Extension
+from sarl_core.explaining.exports.path_interior import PathInterior
 from sarl_core.explaining.exports.program import largest_float32
 from sarl_core.mining.rules import Condition
 from sarl_core.shielding.crossings import numbers_at, places_of
 
 _DRAWN = 256  # states that are looked at for one query
+_PAIRS = 8  # of them, near which there may be states just at the threshold
 _STEPS = np.arange(-24, 25)  # of float32, by which each feature of a combination is moved
 _HALVINGS = 64  # of the way between two float32 numbers, which lie at most 2^32 steps apart
 
@@ -38,43 +41,65 @@ class DerivedThresholds:
         self._width = len(observed_features(features))
         self._extension = Extension.of(features)
         self._typical = typical
+        self._interior = PathInterior(self._extension.definitions, typical)
 
     def states(
-        self, path: Sequence[Condition], query: Condition, rng: np.random.Generator
+        self,
+        path: Sequence[Condition],
+        query: Condition,
+        rest: Sequence[Condition],
+        rng: np.random.Generator,
     ) -> list[NDArray[np.float32]]:
         """States at a query.
 
         Args:
             path: The conditions on the way to it.
             query: That the feature is at most the threshold.
+            rest: The conditions from there to a rule.
             rng: Where chance comes from.
 
         Returns:
             States on either side of the threshold, as near to it as there are; of those the ones
-            first that fulfil the most conditions of the path. Shape (d,) each.
+            first that fulfil the most conditions. Shape (d,) each.
         """
-        drawn = self._drawn(path, query, rng)
-        fulfilled = self._fulfilled(drawn, path)
-        values = self._extension.many(drawn)[:, query.feature]
         threshold = float(query.threshold)
-        order = np.argsort(-fulfilled, kind="stable")
-        below = [row for row in order.tolist() if values[row] <= threshold]
-        above = [row for row in order.tolist() if values[row] > threshold]
-        if not below or not above:
-            return [drawn[int(order[0])]]
-        pair = self._drawn_together(drawn[below[0]], drawn[above[0]], query)
-        near = np.array([*pair, *self._around(pair[0], query)])
-        values = self._extension.many(near)[:, query.feature]
+        whole = (*path, *rest)
         at = largest_float32(threshold)
         with np.errstate(over="ignore"):
-            wanted = [np.nextafter(at, np.float32(side)) for side in (-np.inf, np.inf)]
-        fulfilled = self._fulfilled(near, path)
-        rows = [0, 1]
-        for number in (wanted[0], at, wanted[1]):
-            same = np.flatnonzero(values == number)
-            if len(same):
-                rows.append(int(same[np.argmax(fulfilled[same])]))
-        return [near[row] for row in dict.fromkeys(rows)]
+            wanted = [at, *(np.nextafter(at, np.float32(side)) for side in (-np.inf, np.inf))]
+        result: list[NDArray[np.float32]] = []
+        for drawn in self._candidates(path, query, rest, rng):
+            values = self._extension.many(drawn)[:, query.feature]
+            order = np.argsort(-self._fulfilled(drawn, whole), kind="stable").tolist()
+            below = [drawn[row] for row in order if values[row] <= threshold]
+            above = [drawn[row] for row in order if values[row] > threshold]
+            for one, other in zip(below[:_PAIRS], above[:_PAIRS], strict=False):
+                pair = self._drawn_together(one, other, query)
+                near = np.array([*pair, *self._around(pair[0], query)])
+                fulfils = self._fulfilled(near, whole)
+                near_values = self._extension.many(near)[:, query.feature]
+                result += [] if result else pair
+                for number in tuple(wanted):
+                    same = np.flatnonzero(near_values == number)
+                    if len(same):
+                        result.append(near[int(same[np.argmax(fulfils[same])])])
+                        wanted.remove(number)
+                if not wanted:
+                    return result
+        return result or (below + above)[:1]
+
+    def _candidates(
+        self,
+        path: Sequence[Condition],
+        query: Condition,
+        rest: Sequence[Condition],
+        rng: np.random.Generator,
+    ) -> Iterator[NDArray[np.float32]]:
+        """States that fulfil all conditions, those on the way to the query, and any."""
+        for conditions in dict.fromkeys(((*path, *rest), tuple(path))):
+            fulfilled = partial(self._fulfilled, path=conditions)
+            yield self._interior.states(conditions, query, fulfilled, rng)
+        yield self._drawn(path, query, rng)
 
     def _drawn(
         self, path: Sequence[Condition], query: Condition, rng: np.random.Generator

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +21,7 @@ from sarl_core.explaining.exports.derived_thresholds import DerivedThresholds
 from sarl_core.explaining.exports.program import DimensionProgram, largest_float32, program_of
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.rule_set import RuleSet
-from sarl_core.mining.rule_tree import RuleNode
+from sarl_core.mining.rule_tree import NO_RULE, RuleNode
 from sarl_core.mining.rules import Condition
 from sarl_core.mining.tree import LEAF
 from sarl_core.shielding.projection import Projection
@@ -60,8 +61,9 @@ def make_vectors(
 ) -> Vectors:
     """States at every threshold, one step above it and one below, and what is no state or action.
 
-    The other features of a state are such that it reaches the threshold on the way to the rule; of
-    thresholds on derived features as nearly as there are such states (`DerivedThresholds`).
+    The other features of a state are such that it reaches the threshold on the way to a rule, which
+    applies on one side of it; of thresholds on derived features as nearly as there are such states
+    (`DerivedThresholds`).
     Behind them come states with a number that is none or infinite, and actions that are none. Where
     rules forbid, every label is proposed in each state.
 
@@ -83,11 +85,11 @@ def make_vectors(
     derived = DerivedThresholds(rule_set.source.features, typical)
     rows = [typical]
     for order in program.searches:
-        for path, feature, threshold in _queries(order):
-            if feature < len(typical) and not any(one.feature >= len(typical) for one in path):
-                rows += _at(path, feature, threshold, typical, rng)
+        for path, query, rest in _queries(order):
+            if all(one.feature < len(typical) for one in (*path, query, *rest)):
+                rows += _at((*path, *rest), query.feature, query.threshold, typical, rng)
             else:
-                rows += derived.states(path, Condition(feature, "<=", threshold), rng)
+                rows += derived.states(path, query, rest, rng)
     for feature in range(len(typical)):
         for value in _ODD:
             odd = typical.copy()
@@ -236,20 +238,49 @@ def _typical_values(rule_set: RuleSet) -> NDArray[np.float32]:
     return values
 
 
-def _queries(order: DimensionProgram) -> Iterator[tuple[Sequence[Condition], int, float]]:
-    """Every query with the way to it: of the rules tried one by one, and of the tree."""
+def _queries(
+    order: DimensionProgram,
+) -> Iterator[tuple[Sequence[Condition], Condition, Sequence[Condition]]]:
+    """Every query with the way to it, and from there to a rule, of those tried and of the tree."""
     for _, rule in order.scanned:
-        for depth, condition in enumerate(rule.conditions):
-            yield rule.conditions[:depth], condition.feature, condition.threshold
+        for depth, (feature, _, threshold) in enumerate(rule.conditions):
+            query = Condition(feature, "<=", threshold)
+            yield rule.conditions[:depth], query, rule.conditions[depth + 1 :]
     waiting: list[tuple[RuleNode, tuple[Condition, ...]]] = [(order.nodes[0], ())]
     while waiting:
         node, path = waiting.pop()
         if node.feature == LEAF:
             continue
-        yield path, node.feature, node.threshold
-        for op, child in (("<=", node.left), (">", node.right)):
-            condition = Condition(node.feature, "<=" if op == "<=" else ">", node.threshold)
+        yield path, Condition(node.feature, "<=", node.threshold), _rest(order.nodes, node)
+        for condition, child in _sides(node):
             waiting.append((order.nodes[child], (*path, condition)))
+
+
+def _sides(node: RuleNode) -> tuple[tuple[Condition, int], tuple[Condition, int]]:
+    """What holds on either side of a query, and the node there."""
+    feature, threshold = node.feature, node.threshold
+    return (
+        (Condition(feature, "<=", threshold), node.left),
+        (Condition(feature, ">", threshold), node.right),
+    )
+
+
+def _rest(nodes: Sequence[RuleNode], query: RuleNode) -> tuple[Condition, ...]:
+    """The conditions between a query and the nearest rule that begins at its threshold."""
+    waiting: deque[tuple[RuleNode, str, tuple[Condition, ...]]] = deque(
+        (nodes[child], side.op, ()) for side, child in _sides(query)
+    )
+    while waiting:
+        node, op, path = waiting.popleft()
+        if node.rule != NO_RULE:
+            return path
+        if node.feature == LEAF:
+            continue
+        for condition, child in _sides(node):
+            # The same side of the same feature again leads away from the threshold.
+            if condition[:2] != (query.feature, op):
+                waiting.append((nodes[child], op, (*path, condition)))
+    return ()
 
 
 def _at(
