@@ -9,16 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sarl_core.demonstrations.derived import Extension
+from sarl_core.demonstrations.derived import Combination, Extension
 from sarl_core.demonstrations.words import columns_of_words
 from sarl_core.errors import InputError
 from sarl_core.mining.rule_order import without_idle
-from sarl_core.shielding.crossings import crossings
+from sarl_core.shielding.crossings import crossings, numbers_at, places_of
+from sarl_core.shielding.pair_moves import pair_moves
 from sarl_core.shielding.shield import BatchDecision, Shield
 
 Floats = NDArray[np.float64]
@@ -26,6 +28,8 @@ States = NDArray[np.float32]
 
 _LARGEST = np.finfo(np.float32).max
 _DOWN, _UP = np.float32(-np.inf), np.float32(np.inf)
+_STEPS = np.arange(-3, 4)  # of float32
+_SPARE = 1e-6  # part of what is compared that is kept clear of rounding
 
 
 class FeatureChange(NamedTuple):
@@ -130,6 +134,29 @@ class Neighbourhood:
         self._begin, self._beyond = at_least(least), after(most)
         columns = columns_of_words([one.indicator for one in features])
         self._words = [np.array(places) for places in columns.values() if len(places) > 1]
+        self._lay_out_pairs()
+
+    def _lay_out_pairs(self) -> None:
+        """What pairs of features move, and how far what is derived moves with each."""
+        width, definitions = self._extension.width, self._extension.definitions
+        of_words = {place for places in self._words for place in places.tolist()}
+        free = [feature for feature in range(width) if feature not in of_words]
+        pairs = list(combinations(free, 2)) if definitions else []
+        self._pairs = np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        self._normals = np.concatenate([np.eye(width), np.zeros((len(definitions), width))])
+        self._linear = np.ones(len(self._normals), dtype=np.bool_)
+        for place, definition in enumerate(definitions, start=width):
+            self._linear[place] = isinstance(definition, Combination)
+            if isinstance(definition, Combination):
+                for feature, coefficient in definition.terms:
+                    self._normals[place, feature] = coefficient
+        # Columns that a feature, or a pair, leaves as they are; a pair is not looked for that would
+        # have to bring about what a formula asks.
+        moving = self._normals != 0.0
+        self._unmoved_by_pairs = ~(moving[:, self._pairs[:, 0]] | moving[:, self._pairs[:, 1]])
+        self._unmoved = np.ones((len(moving), width), dtype=np.bool_)
+        for feature in free:
+            self._unmoved[self._moving(feature), feature] = False
 
     def near_misses(
         self, state: ArrayLike, spreads: Floats, *, features: int = 1, most: int = 8
@@ -137,7 +164,9 @@ class Neighbourhood:
         """Rules that would apply if few features were a little different.
 
         What is derived changes with the features that are observed; those are moved. A rule that
-        lacks something derived is said once for each feature that could bring it about alone.
+        lacks something derived is said once for each feature that could bring it about alone, and
+        with the nearest two where none could. Two are not looked for that would have to bring
+        about what a formula asks.
 
         Args:
             state: Shape (d,); finite, taken as float32.
@@ -194,13 +223,14 @@ class Neighbourhood:
         whole = self._extension.many(here[None])[0]
         broken = ~((self._first <= whole) & (whole <= self._last))
         misses: list[NearMiss] = []
-        for row in range(len(self._index)):
-            if not broken[row].any():
-                continue
+        # Whoever moves has to move all that a rule lacks.
+        ways = ~(broken @ (self._unmoved if features == 1 else self._unmoved_by_pairs))
+        for row in np.flatnonzero(broken.any(axis=1) & ways.any(axis=1)).tolist():
+            movers = np.flatnonzero(ways[row])
             wanted = (
-                self._one_moved(here, row, broken[row])
+                self._one_moved(here, row, movers)
                 if features == 1
-                else self._clipped(here, row, broken[row], features)
+                else self._two_moved(here, row, self._pairs[movers], spreads)
             )
             for state in wanted:
                 moved = np.flatnonzero(state != here)
@@ -219,17 +249,9 @@ class Neighbourhood:
                 )
         return tuple(sorted(misses, key=lambda miss: miss.distance)[:most])
 
-    def _one_moved(self, here: States, row: int, broken: NDArray[np.bool_]) -> Iterator[States]:
+    def _one_moved(self, here: States, row: int, movers: NDArray[np.int64]) -> Iterator[States]:
         """For each feature that alone can let a rule apply, the nearest state in which it does."""
-        of_words = {at: places for places in self._words for at in places.tolist()}
-        for feature in range(len(here)):
-            columns = self._moving(feature)
-            if (
-                feature in of_words
-                or not broken[columns].any()
-                or broken[columns].sum() < broken.sum()
-            ):
-                continue
+        for feature in movers.tolist():
             edges = self._edges(here, feature, np.array([row]), boxes=False)
             values = np.concatenate([edges, np.nextafter(edges, _DOWN)])
             states = np.repeat(here[None], len(values), axis=0)
@@ -239,15 +261,42 @@ class Neighbourhood:
                 way = np.abs(states[:, feature].astype(np.float64) - float(here[feature]))
                 yield states[int(np.argmin(way))]
 
-    def _clipped(
-        self, here: States, row: int, broken: NDArray[np.bool_], features: int
+    def _two_moved(
+        self, here: States, row: int, pairs: NDArray[np.int64], spreads: Floats
     ) -> Iterator[States]:
-        """The nearest state in which a rule applies that lacks nothing derived."""
-        d = len(here)
-        state = np.clip(here, self._first[row, :d], self._last[row, :d])
-        possible = not broken[d:].any() and broken[:d].sum() == features
-        if possible and np.isfinite(state).all() and self._applies(state[None], row)[0]:
-            yield state
+        """The nearest state in which a rule applies that no feature alone brings about."""
+        first, last = (side[row].astype(np.float64) for side in (self._first, self._last))
+        values = self._normals @ here.astype(np.float64)
+        upper, lower = (np.isfinite(side) & self._linear for side in (last, first))
+        normals = np.concatenate([self._normals[upper], -self._normals[lower]])
+        room = np.concatenate([(last - values)[upper], (values - first)[lower]])
+        moves = pair_moves(normals, room, pairs, spreads)
+        nearest = int(moves.distance.argmin())
+        reached = np.isfinite(moves.distance)
+        if not reached.any() or (moves.by[reached] == 0.0).any():
+            return
+        # What is derived is rounded, so the state may lie a few float32 numbers further.
+        for spare in (0.0, _SPARE):
+            if spare:
+                room = room - spare * (np.abs(normals) @ np.abs(here) + np.abs(room))
+                moves = pair_moves(normals, room, pairs[[nearest]], spreads)
+                nearest, pairs = 0, pairs[[nearest]]
+            if not np.isfinite(moves.by[nearest]).all():
+                return
+            states = self._around(here, pairs[nearest], moves.by[nearest])
+            states = states[self._applies(states, row)]
+            if len(states):
+                way = np.abs(states.astype(np.float64) - here.astype(np.float64)) / spreads
+                yield states[int(way.sum(axis=1).argmin())]
+                return
+
+    def _around(self, here: States, pair: NDArray[np.int64], by: Floats) -> States:
+        """States with two features moved so far, or a few float32 numbers further or less."""
+        moved = (here[pair].astype(np.float64) + by).astype(np.float32)
+        steps = np.stack(np.meshgrid(_STEPS, _STEPS), axis=-1).reshape(-1, 2)
+        states = np.repeat(here[None], len(steps), axis=0)
+        states[:, pair] = numbers_at(places_of(moved) + steps)
+        return np.asarray(states[np.isfinite(states).all(axis=1)])
 
     def _applies(self, states: States, row: int) -> NDArray[np.bool_]:
         """Whether a rule's conditions hold, (B,)."""
