@@ -373,7 +373,10 @@ def with_bare_combine(arguments: Sequence[str]) -> list[str]:
     """
     typed = list(arguments)
     for place, argument in enumerate(typed):
-        if argument == "--combine" and not any("," in one for one in typed[place + 1 : place + 2]):
+        behind = typed[place + 1] if place + 1 < len(typed) else "--"
+        # What has a comma is names. So is one word or none at all; all else looks like a file.
+        names = "," in behind or not (behind.startswith("-") or set(behind) & set("./*\\:"))
+        if argument == "--combine" and not (names and not Path(behind or "no file").exists()):
             typed[place] = f"--combine={EVERY_PAIR}"
     return typed
 

@@ -53,7 +53,8 @@ class Combination:
             )
         if not (isfinite(ratio) and 0.0 < abs(ratio) <= LARGEST_RATIO):
             raise InputError(
-                f"the ratio of a combination is {quoted(ratio)}; give a number that is not 0"
+                f"the ratio of a combination is {quoted(ratio)}, and not a number other than 0 "
+                f"from -{LARGEST_RATIO:.0e} to {LARGEST_RATIO:.0e}; give one"
             )
 
     @property

@@ -499,13 +499,15 @@ def after(values: NDArray[Any]) -> States:
 def at_most(values: NDArray[Any]) -> States:
     """The largest float32 number that is no larger than each value; inf for inf."""
     near = _float32(values)
-    return np.where(near > values, np.nextafter(near, _DOWN), near).astype(np.float32)
+    with np.errstate(over="ignore"):
+        return np.where(near > values, np.nextafter(near, _DOWN), near).astype(np.float32)
 
 
 def at_least(values: NDArray[Any]) -> States:
     """The least float32 number that is no smaller than each value; -inf for -inf."""
     near = _float32(values)
-    return np.where(near < values, np.nextafter(near, _UP), near).astype(np.float32)
+    with np.errstate(over="ignore"):
+        return np.where(near < values, np.nextafter(near, _UP), near).astype(np.float32)
 
 
 def _float32(values: NDArray[Any]) -> States:

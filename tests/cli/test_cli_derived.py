@@ -102,6 +102,9 @@ def test_units_that_do_not_fit_are_warned_of(run):
     [
         (("--combine", "pole angle, speed"), "'speed' is no feature"),
         (("--combine", "pole angle, pole angle"), "combined with itself"),
+        (("--combine", "pole angle"), "names one feature"),
+        (("--combine", "pole angle;cart velocity"), "is no feature"),
+        (("--combine", ""), "is no feature"),
         (("--feature", "a = pole angle / nothing"), "'nothing' (sign 14) is no feature"),
         (("--feature", "a = " + "+".join(["1"] * 251)), "more than 500"),
         (("--feature", "a = " + "(" * 51 + "1" + ")" * 51), "50 deep"),
@@ -122,9 +125,11 @@ def test_what_cannot_be_derived_is_refused_in_one_sentence(arguments, says, tmp_
     assert not out.exists()
 
 
-def test_a_lone_option_has_a_value_only_with_a_comma():
+def test_a_lone_option_has_a_value_unless_what_follows_is_an_option_or_a_file():
     assert with_bare_combine(["mine", "--combine", "a.csv"]) == ["mine", "--combine=*", "a.csv"]
     assert with_bare_combine(["--combine"]) == ["--combine=*"]
+    assert with_bare_combine(["--combine", "pole angle"]) == ["--combine", "pole angle"]
+    assert with_bare_combine(["--combine", "docs"]) == ["--combine=*", "docs"]
     named = ["mine", "a.csv", "--combine", "one, other", "--combine", "--out", "x"]
     assert with_bare_combine(named) == [*named[:4], "--combine=*", "--out", "x"]
 

@@ -203,7 +203,9 @@ def test_rules_that_nearly_apply_say_what_they_lack():
     ]
     none = misses_html([], RULES)
     assert not table(none)
-    assert "No rule would apply if one or two features were different." in words(none)
+    assert "No rule was found that would apply if one or two features were different." in words(
+        none
+    )
 
 
 def test_a_miss_that_another_rule_would_still_come_before_is_not_in_force():

@@ -259,6 +259,14 @@ BAD = {
     "more samples than steps": (lambda d: d["rules"][0].update(samples=10**9), "'samples'"),
     "a divider of 0": (lambda d: d.update(divider=0), "'divider' is 0"),
     "a doubled id": (lambda d: d["rules"].append(d["rules"][0]), "stands twice"),
+    "a doubled feature": (
+        lambda d: d["features"][1].update(name=d["features"][0]["name"]),
+        "stands twice in features 1",
+    ),
+    "a feature without a name": (
+        lambda d: d["features"][1].update(name=" "),
+        "the name is empty in features 2",
+    ),
     "no features": (lambda d: d.update(features=[]), "features"),
     "an impossible threshold": (lambda d: d["thresholds"].update(support=3.0), "'support' is 3"),
     "a rule that is a number": (lambda d: d["rules"].append(5), "not an object"),

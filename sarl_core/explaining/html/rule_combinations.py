@@ -22,20 +22,24 @@ from sarl_core.mining.action_words import label_text
 from sarl_core.mining.labels import LabelledDimension
 from sarl_core.mining.language import condition_text, short_condition
 
-MOST = 6  # combinations of one rule
 _SIZE = 1000  # of the picture, which is stretched to the plot
 _X_TICKS, _Y_TICKS = 5, 4  # at most, beside zero
 
 
 def combinations_html(
-    plots: Sequence[CombinationPlot], features: Sequence[Feature], dimension: LabelledDimension
+    plots: Sequence[CombinationPlot],
+    features: Sequence[Feature],
+    dimension: LabelledDimension,
+    *,
+    most: int | None = None,
 ) -> Markup:
     """A picture for each combination that a rule asks about.
 
     Args:
-        plots: See `combination_plots`; the first `MOST` are drawn.
+        plots: See `combination_plots`.
         features: Those that the rule's conditions are about.
         dimension: Whose actions colour the points.
+        most: Draw the first so many; None for all.
 
     Returns:
         The two features as axes, the demonstrations in the actions' colours, the line where the
@@ -46,9 +50,9 @@ def combinations_html(
     done = np.unique(np.concatenate([one.labels for one in plots])).tolist()
     key = [(label_text(label, dimension), label_colour(label)) for label in done]
     key.append(("the side that the rule takes", faded(MARKER_COLOUR, 0.25)))
-    if len(plots) > MOST:
-        key.append((f"the first {MOST} of {len(plots)} combinations", ""))
-    figures = [_figure(one, features) for one in plots[:MOST]]
+    if most is not None and len(plots) > most:
+        key.append((f"the first {most} of {len(plots)} combinations", ""))
+    figures = [_figure(one, features) for one in plots[:most]]
     return render("rules/features", key=key, figures=figures)
 
 

@@ -40,6 +40,7 @@ from sarl_core.rendering.example_frames import ExampleFrame, Examples
 
 _MOST_VALUES = 3  # under a picture
 _MOST_POINTS = 500  # of a combination: a report holds many
+_MOST_COMBINATIONS = 6  # drawn of one rule; the dashboard draws all
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ def rule_card(
         support=_support(rule, applying, decided, tally),
         evidence=_evidence(rule, rule_set, index, tally, applying),
         conditions=_conditions(rule, rule_set, ranges, demonstrations.observations[rows]),
-        combinations=combinations_html(planes, features, dimension),
+        combinations=combinations_html(planes, features, dimension, most=_MOST_COMBINATIONS),
         pictures=tuple(_picture(frame, rule, rule_set, ranges) for frame in frames),
     )
 
@@ -334,8 +335,10 @@ def _condition(
     unit = f" {feature.unit}" if feature.unit else ""
     low = number_text(row.low, apart_from=row.high)
     high = number_text(row.high, apart_from=row.low)
-    finite = [value for value in (bounds.low, bounds.high) if math.isfinite(value)]
-    scale = SvgScale.over([row.low, row.high, *finite], margin=0.04)
+    # A formula may be infinite; what is stands at the edge.
+    ends = (row.low, row.high, bounds.low, bounds.high)
+    finite = [value for value in ends if math.isfinite(value)]
+    scale = SvgScale.over(finite, margin=0.04)
     return ConditionRow(
         text,
         f"{low} to {high}{unit}",

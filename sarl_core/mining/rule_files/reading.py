@@ -106,7 +106,9 @@ class _Definition(DocumentPart):
             assert self.terms is not None
             combination = Combination(self.terms)
         except InputError as error:
-            raise MisfitError(str(error), "derived") from error
+            # Without the advice, which is for whoever types it.
+            what, _, _ = str(error).rpartition("; ")
+            raise MisfitError(what or str(error), "derived") from error
         for place in combination.features:
             if not 0 <= place < len(observed):
                 what = f"there is no feature {quoted(place)} among the {len(observed)} before it"
@@ -373,7 +375,14 @@ def _features(entries: Sequence[_Feature], version: int) -> tuple[Feature, ...]:
             observed.append(feature)
         return feature
 
-    return each(entries, "features", read)
+    features = each(entries, "features", read)
+    names = Counter(feature.name for feature in features)
+    for number, feature in enumerate(features, start=1):
+        if not feature.name.strip():
+            raise MisfitError("the name is empty", f"features {number}")
+        if names[feature.name] > 1:
+            raise MisfitError(f"the name {quoted(feature.name)} stands twice", f"features {number}")
+    return features
 
 
 class _Document(DocumentPart, Generic[_Held]):
