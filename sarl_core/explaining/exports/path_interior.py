@@ -63,10 +63,10 @@ class PathInterior:
         far = _FAR * (1.0 + largest)
         rows, limits = self._half_spaces(path)
         normal = self._normal(query.feature)
-        found = self._centre(rows, limits, normal, query.threshold, far)
-        if found is None:
+        middle = self._centre(rows, limits, normal, query.threshold, far)
+        if middle is None:
             return nothing
-        centre, radius = found
+        centre, radius = middle
         if normal is not None:
             unit = normal / np.linalg.norm(normal)
             along = rng.normal(size=(_PLACES, len(unit)))
