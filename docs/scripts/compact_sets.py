@@ -35,6 +35,7 @@ OPTIONS = {
     "turns": "refine",
     "search_episodes": "search-episodes",
     "search_limit": "search-limit",
+    "search_starts": "search-starts",
     "validation": "validation",
     "report": "report-episodes",
     "choose": "choose",

@@ -129,6 +129,16 @@ def aggregate(
             show_default="the environment's own",
         ),
     ] = None,
+    search_starts: Annotated[
+        int | None,
+        typer.Option(
+            "--search-starts",
+            help="With --refine: move the rules of so many of the best rounds a little, the better "
+            "half on, and so forth, before the best of them is gone on with. Few rules of one "
+            "feature gain most by more.",
+            show_default="an eighth of the rounds, 4 at least",
+        ),
+    ] = None,
     validation: Annotated[
         int, typer.Option("--validation", help="Episodes by which the best is chosen.")
     ] = 256,
@@ -158,9 +168,10 @@ def aggregate(
         from sarl_core.improving.aggregation import recorded_environment
         from sarl_core.improving.plan import Plan
 
-        if not refine and (search_episodes, search_limit) != (None, None):
-            name = "episodes" if search_episodes is not None else "limit"
-            raise InputError(f"--search-{name} is about a refinement; give --refine, too")
+        searches = {"episodes": search_episodes, "limit": search_limit, "starts": search_starts}
+        for name, given in searches.items():
+            if given is not None and not refine:
+                raise InputError(f"--search-{name} is about a refinement; give --refine, too")
         plan = Plan(
             max_rules=max_rules,
             rounds=rounds,
@@ -171,6 +182,7 @@ def aggregate(
             turns=refine,
             search_episodes=Plan.search_episodes if search_episodes is None else search_episodes,
             search_limit=search_limit,
+            search_starts=search_starts,
             validation=validation,
             report=report,
             seed=seed,

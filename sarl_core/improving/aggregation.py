@@ -292,7 +292,9 @@ class _Run:
         plan = self.plan
         refined = 0
         if plan.turns:
-            refined = refinement_cost(plan.turns, plan.search_episodes, plan.rounds)
+            refined = refinement_cost(
+                plan.turns, plan.search_episodes, plan.rounds, plan.search_starts
+            )
         chosen = _choice_cost(plan, _most_choices(plan))
         return plan.rounds * plan.episodes + refined + chosen + plan.report
 
@@ -460,6 +462,7 @@ class _Run:
             combined=plan.combined,
             max_rules=plan.max_rules,
             episodes=plan.search_episodes,
+            moved=plan.search_starts,
             first=first,
             seed=plan.seed,
             jobs=self.jobs,

@@ -125,6 +125,7 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         "turns": plan.turns,
         **({"search_episodes": plan.search_episodes} if plan.turns else {}),
         **({} if plan.search_limit is None else {"search_limit": plan.search_limit}),
+        **({} if plan.search_starts is None else {"search_starts": plan.search_starts}),
         "rounds": [_round(one) for one in aggregation.rounds],
         "chosen_round": aggregation.chosen,
         "refined": aggregation.refined,

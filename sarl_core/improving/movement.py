@@ -7,6 +7,7 @@ combinations the two that are combined, their order, and the labels of discrete 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -180,7 +181,10 @@ class Movement:
 def _evolution_strategy(count: int, step: float, seed: int) -> Any:
     """A search from 0 in so many dimensions."""
     import cma
+    from cma.evolution_strategy import InjectionWarning
 
+    # Where all neighbours do alike it is not told of them, which it takes for an oversight.
+    warnings.simplefilter("ignore", InjectionWarning)
     generator = np.random.default_rng(seed)
     return cma.CMAEvolutionStrategy(
         np.zeros(count),

@@ -37,6 +37,8 @@ class Plan:
         search_episodes: For each neighbour that it tries.
         search_limit: Steps that its episodes may take where the environment would end them
             earlier, so that what fails later is told apart, too; None for the environment's own.
+        search_starts: Of how many rounds the rules are moved before the best of them is gone on
+            with; as `Refinement` does it where None.
         validation: Episodes by which the best of all is chosen in the end.
         report: Episodes of the final report.
         seed: Another one gives other episodes.
@@ -56,6 +58,7 @@ class Plan:
     turns: int = 0
     search_episodes: int = 16
     search_limit: int | None = None
+    search_starts: int | None = None
     validation: int = 256
     report: int = 100
     seed: int = 0
@@ -88,6 +91,7 @@ class Plan:
             ("number of report episodes", self.report, 1, MOST_VALIDATION),
             ("seed", self.seed, 0, None),
             ("limit of a search episode", _or_one(self.search_limit), 1, None),
+            ("number of search starts", _or_one(self.search_starts), 1, self.rounds),
             ("max_steps", _or_one(self.max_steps), 1, None),
         ):
             _check_number(name, value, least, most)
@@ -95,7 +99,10 @@ class Plan:
 
     def _most_turns(self) -> int:
         """Of which the seeds of one run are enough."""
-        none, one = (refinement_seeds(n, self.search_episodes, self.rounds) for n in range(2))
+        none, one = (
+            refinement_seeds(n, self.search_episodes, self.rounds, self.search_starts)
+            for n in range(2)
+        )
         left = SEEDS_A_RUN - none
         if self.turns and left < one - none:
             raise InputError(

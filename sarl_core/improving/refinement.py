@@ -60,18 +60,19 @@ def _halvings(ways: int) -> list[tuple[int, int]]:
     return stages
 
 
-def _ways_of(starts: int) -> int:
+def _ways_of(starts: int, moved: int | None) -> int:
     """How many of so many starts are moved."""
-    return min(starts, max(_SHAPES, starts // _STARTS))
+    return min(starts, max(_SHAPES, starts // _STARTS) if moved is None else moved)
 
 
-def refinement_cost(turns: int, episodes: int, starts: int = 1) -> int:
+def refinement_cost(turns: int, episodes: int, starts: int = 1, moved: int | None = None) -> int:
     """Most episodes of a refinement.
 
     Args:
         turns: How many.
         episodes: Of each neighbour.
         starts: What it may begin with.
+        moved: How many of these are moved; as `Refinement` does it where None.
     """
 
     def ranked(count: int, times: int) -> int:
@@ -84,25 +85,27 @@ def refinement_cost(turns: int, episodes: int, starts: int = 1) -> int:
         )
 
     met, compared = _MET * episodes, 2 * _COMPARED * episodes
-    begun = ranked(starts, _COMPARED) + met + halved(_ways_of(starts)) + compared
+    ways = _ways_of(starts, moved)
+    begun = ranked(starts, _COMPARED) + met + halved(ways) + compared
     shapes, late = ranked(_NEIGHBOURS, _RANKED), _LATE * POPULATION * _CAREFUL * episodes
     turn = met + shapes + halved(_SHAPES) + late + 2 * compared
     return _EXPERT * episodes + (begun if starts > 1 else 0) + turns * turn
 
 
-def refinement_seeds(turns: int, episodes: int, starts: int = 1) -> int:
+def refinement_seeds(turns: int, episodes: int, starts: int = 1, moved: int | None = None) -> int:
     """Most seeds of a refinement: all that are compared play the same episodes.
 
     Args:
         turns: How many.
         episodes: Of each neighbour.
         starts: What it may begin with.
+        moved: How many of these are moved; as `Refinement` does it where None.
     """
 
     def halved(ways: int) -> int:
         return sum(left * generations + _RANKED for left, generations in _halvings(ways))
 
-    begun = _COMPARED + _MET + halved(_ways_of(starts)) + _COMPARED
+    begun = _COMPARED + _MET + halved(_ways_of(starts, moved)) + _COMPARED
     turn = _MET + _RANKED + halved(_SHAPES) + _COMPARED + _LATE * _CAREFUL + _COMPARED
     return episodes * (_EXPERT + (begun if starts > 1 else 0) + turns * turn)
 
@@ -120,6 +123,7 @@ class Refinement:
         combined: Sequence[Pair] = (),
         max_rules: int,
         episodes: int,
+        moved: int | None = None,
         first: int,
         seed: int = 0,
         jobs: int = 1,
@@ -137,6 +141,8 @@ class Refinement:
             combined: Pairs of features of which new queries may ask about combinations.
             max_rules: Most leaves of each tree.
             episodes: For each neighbour, the same for all of a generation.
+            moved: How many of the starts that achieve most have their thresholds moved; an eighth
+                of all, four at least, where None.
             first: Seed of the first episode.
             seed: Another one gives another way.
             jobs: Processes; changes the speed, never the result.
@@ -153,6 +159,7 @@ class Refinement:
         self._done = self._total = 0
         self._evaluator, self._expert = evaluator, expert
         self._combined, self._max_rules, self._episodes = combined, max_rules, episodes
+        self._moved_starts = moved
         self._next, self._generator = first, np.random.default_rng(seed)
         self._workers = executor_of(jobs, executor)
 
@@ -196,7 +203,7 @@ class Refinement:
         return list(different.values())
 
     def _cost(self, turns: int, starts: int = 1) -> int:
-        return refinement_cost(turns, self._episodes, starts)
+        return refinement_cost(turns, self._episodes, starts, self._moved_starts)
 
     def _begin(self) -> None:
         """Begin with what achieves most when it is moved."""
@@ -209,7 +216,7 @@ class Refinement:
         self._begin_with(ranking[0])
         self._better(self.start)
         met = self._met()
-        best = ranking[: _ways_of(len(self._starts))]
+        best = ranking[: _ways_of(len(self._starts), self._moved_starts)]
         ways = [self._movement(self._starts[index], met) for index in best]
         place = self._halved(ways, met)
         if self._is_as_good(ways[place].here, self.start, met):

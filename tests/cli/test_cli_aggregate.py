@@ -65,6 +65,8 @@ def test_without_an_expert_the_gaps_are_written(run, tmp_path):
         ),
         (("--search-limit", "900"), "--search-limit is about a refinement; give --refine, too"),
         (("--search-episodes", "9"), "--search-episodes is about a refinement"),
+        (("--search-starts", "9"), "--search-starts is about a refinement"),
+        (("--refine", "1", "--search-starts", "99"), "the number of search starts is 99; give"),
         (("--refine", "1", "--search-limit", "0"), "the limit of a search episode is 0"),
         (("--expert", "novice"), "acts at random"),
         (("--expert", "nowhere.npz"), "nowhere.npz"),

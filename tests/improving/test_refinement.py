@@ -407,3 +407,21 @@ def test_the_seeds_of_a_turn_are_counted() -> None:
     once, one, two = (refinement_seeds(turns, 16) for turns in range(3))
     assert two - one == one - once > once > 0
     assert refinement_seeds(2, 32) == 2 * two
+
+
+@pytest.mark.parametrize(("moved", "ways"), [(None, 2), (5, 5), (1, 1)])
+def test_as_many_starts_are_moved_as_is_said(moved, ways, sized_search, monkeypatch) -> None:
+    sized_search(population=4, _SHAPES=2, _EARLY=1, _COMPARED=1, _MET=1)
+    halved = Refinement._halved
+    counted: list[int] = []
+
+    def counting(self, movements, met):
+        counted.append(len(movements))
+        return halved(self, movements, met)
+
+    monkeypatch.setattr(Refinement, "_halved", counting)
+    others = [grow_budgeted_trees(CARTPOLE, max_rules=rules) for rules in (3, 4, 5, 6)]
+    ticks: list[tuple[int, int]] = []
+    search(*others, moved=moved).run(0, progress=lambda *tick: ticks.append(tick) or True)
+    assert counted == [ways]
+    assert ticks[-1] == (refinement_cost(0, 2, 5, moved),) * 2
