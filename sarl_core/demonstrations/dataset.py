@@ -157,8 +157,8 @@ def formula_feature(text: str, features: Sequence[Feature]) -> DerivedFeature:
     match = _NAMED.fullmatch(name.strip())
     if not equals or match is None:
         raise InputError(
-            f"{quoted(text)} is no feature; write its name, its unit in brackets and its formula, "
-            "as 'time to collision [s] = gap / (own_speed - lead_speed)'"
+            f"{quoted(text)} is no feature; write its name (without < and >), its unit in brackets "
+            "and its formula, as 'time to collision [s] = gap / (own_speed - lead_speed)'"
         )
     if len(match["name"]) > _LONGEST_NAME:
         raise InputError(

@@ -104,7 +104,7 @@ def test_a_formula_is_changed_and_two_stand_beside_each_other() -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("time", "is no feature; write its name, its unit in brackets and its formula"),
+        ("time", "is no feature; write its name (without"),
         (
             "rate = cart_velocty / 2",
             "'cart_velocty' (sign 1) is no feature; did you mean 'cart velocity'?",
