@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.dataset import Demonstrations
@@ -39,6 +40,21 @@ def find_warnings(demonstrations: Demonstrations) -> tuple[str, ...]:
     )
 
 
+def constant_warnings(name: str, values: NDArray[np.float32]) -> tuple[str, ...]:
+    """What is to be said of a feature that never changes.
+
+    Args:
+        name: Of the feature.
+        values: In every step, (N,).
+
+    Returns:
+        One sentence; none where it changes.
+    """
+    if not np.all(values == values[0]):
+        return ()
+    return (f"feature {name!r} has the same value in every step, so no rule can use it",)
+
+
 def _feature_warnings(demonstrations: Demonstrations) -> list[str]:
     constant: list[str] = []
     doubled: list[str] = []
@@ -48,10 +64,8 @@ def _feature_warnings(demonstrations: Demonstrations) -> list[str]:
         demonstrations.observations.T,
         strict=True,
     ):
-        if np.all(column == column[0]):
-            constant.append(
-                f"feature {name!r} has the same value in every step, so no rule can use it"
-            )
+        if never := constant_warnings(name, column):
+            constant += never
             continue
         key = hashlib.blake2b(np.ascontiguousarray(column).data, digest_size=16).digest()
         if key in seen:

@@ -101,6 +101,13 @@ def test_a_formula_is_changed_and_two_stand_beside_each_other() -> None:
     assert formulas(app)[0] == "cart_velocity * cart_velocity"
 
 
+def test_a_formula_that_never_changes_is_warned_of() -> None:
+    app = typed(open_page("names", data="cartpole"), "five = 5")
+    (warning,) = [one.value for one in app.warning]
+    assert "'five' has the same value in every step, so no rule can use it" in warning
+    assert not app.button(key="formula_take").disabled
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

@@ -10,6 +10,7 @@ from sarl_core.demonstrations.dataset import Demonstrations, derived_over, formu
 from sarl_core.demonstrations.derived import DerivedFeature, formula_text
 from sarl_core.demonstrations.formula_units import unit_warnings
 from sarl_core.demonstrations.names import Names, names_of, renamed
+from sarl_core.demonstrations.warnings import constant_warnings
 from sarl_core.environments.formulas import Formula
 from sarl_core.errors import InputError
 from sarl_core.explaining.figures.distributions import FeatureRow
@@ -40,7 +41,7 @@ class TriedFormula:
     Attributes:
         feature: Over the names of the data as they were read; None where it is none.
         problem: Why it is none, in one sentence; "" where it is one.
-        warnings: What is odd about its units.
+        warnings: What is odd about its units, or that it never changes.
         distribution: Its values in the demonstrations.
     """
 
@@ -84,7 +85,10 @@ def _read(
     dimension = label_dimensions(ready, divider)[0]
     return TriedFormula(
         feature,
-        warnings=tuple(unit_warnings([*ready.observed, ready.features[index]])),
+        warnings=(
+            *unit_warnings([*ready.observed, ready.features[index]]),
+            *constant_warnings(feature.name, ready.observations[:, index]),
+        ),
         distribution=distribution_of(ready, index, dimension, 0),
     )
 
