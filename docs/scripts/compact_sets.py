@@ -77,7 +77,7 @@ _WALKER = Plan(
     divider=15,
     turns=1,
     search_episodes=4,
-    validation=256,
+    validation=64,
     report=1_000,
     choose="failures",
 )
@@ -93,7 +93,8 @@ SETS = {
         "lunar_lander", replace(_LANDER, max_rules=8), "every"
     ),
     "lunar_lander_compact": RuleSetPlan(
-        "lunar_lander", replace(_LANDER, max_rules=19, rounds=64, turns=10)
+        "lunar_lander",
+        replace(_LANDER, max_rules=19, rounds=64, turns=2, search_episodes=8, search_starts=32),
     ),
     "lunar_lander_continuous_combined": RuleSetPlan(
         "lunar_lander_continuous", _CONTINUOUS_LANDER, "every"

@@ -266,7 +266,7 @@ def test_the_form_shows_what_most_need_and_keeps_the_rest_at_hand() -> None:
 
 
 def test_stopped_learning_is_kept_and_goes_on(own_folder: Path) -> None:
-    app = own("none", learn_steps="10000")  # so many that it cannot have ended when it is stopped
+    app = own("none", learn_steps="50000")  # so many that it cannot have ended when it is stopped
     app.button(key="run_learning").click().run()
     job = app.session_state["_job_learning"]
     for _ in range(600):
