@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial, wraps
+from os.path import exists
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, get_args
 
@@ -373,12 +374,18 @@ def with_bare_combine(arguments: Sequence[str]) -> list[str]:
     """
     typed = list(arguments)
     for place, argument in enumerate(typed):
-        behind = typed[place + 1] if place + 1 < len(typed) else "--"
-        # What has a comma is names. So is one word or none at all; all else looks like a file.
-        names = "," in behind or not (behind.startswith("-") or set(behind) & set("./*\\:"))
-        if argument == "--combine" and not (names and not Path(behind or "no file").exists()):
+        if argument == "--combine" and not _are_names(typed[place + 1 : place + 2]):
             typed[place] = f"--combine={EVERY_PAIR}"
     return typed
+
+
+def _are_names(behind: Sequence[str]) -> bool:
+    """Whether what stands behind ``--combine`` names features, and is no option and no file."""
+    if not behind or behind[0].startswith("-"):
+        return False
+    (text,) = behind
+    # What is longer than a file's name can be is an error for `Path.exists`.
+    return "," in text or not (set(text) & set("./*\\:") or exists(text))  # noqa: PTH110
 
 
 def with_derived(command: Callable[..., None]) -> Callable[..., None]:

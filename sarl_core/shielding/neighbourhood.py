@@ -1,8 +1,9 @@
 """What lies near a state: rules that almost apply, and where the shield would decide otherwise.
 
-Everything here is exact to the float32 number. Along one feature the shield's decision can change
-only at a threshold or at the edge of a data box of a rule whose other conditions hold; so it is
-asked once between each two of them, and nothing is sampled.
+Everything here is exact to the float32 number, but that two features that are moved for a
+combination may go a few numbers too far. Along one feature the shield's decision can change only at
+a threshold or at the edge of a data box of a rule whose other conditions hold; so it is asked once
+between each two of them, and nothing is sampled.
 """
 
 from __future__ import annotations
@@ -271,19 +272,16 @@ class Neighbourhood:
         normals = np.concatenate([self._normals[upper], -self._normals[lower]])
         room = np.concatenate([(last - values)[upper], (values - first)[lower]])
         moves = pair_moves(normals, room, pairs, spreads)
-        nearest = int(moves.distance.argmin())
-        reached = np.isfinite(moves.distance)
-        if not reached.any() or (moves.by[reached] == 0.0).any():
+        if moves.alone.any():
             return
+        pair = pairs[[int(moves.distance.argmin())]]
         # What is derived is rounded, so the state may lie a few float32 numbers further.
         for spare in (0.0, _SPARE):
-            if spare:
-                room = room - spare * (np.abs(normals) @ np.abs(here) + np.abs(room))
-                moves = pair_moves(normals, room, pairs[[nearest]], spreads)
-                nearest, pairs = 0, pairs[[nearest]]
-            if not np.isfinite(moves.by[nearest]).all():
+            clear = spare * (np.abs(normals) @ np.abs(here) + np.abs(room))
+            move = pair_moves(normals, room - clear, pair, spreads)
+            if not np.isfinite(move.distance[0]):
                 return
-            states = self._around(here, pairs[nearest], moves.by[nearest])
+            states = self._around(here, pair[0], move.by[0])
             states = states[self._applies(states, row)]
             if len(states):
                 way = np.abs(states.astype(np.float64) - here.astype(np.float64)) / spreads

@@ -18,10 +18,12 @@ class PairMoves(NamedTuple):
     Attributes:
         by: How far each of the two goes, (P, 2).
         distance: Sum of both in units of their spreads, (P,); inf where no move does.
+        alone: Whether one of the two could do it alone, perhaps by going further, (P,).
     """
 
     by: Floats
     distance: Floats
+    alone: NDArray[np.bool_]
 
 
 def pair_moves(
@@ -59,6 +61,7 @@ def pair_moves(
         holds = (parts[0] + parts[1] <= room + rounding).all(axis=2)
         distance = (np.abs(by) / spreads[pairs][:, None]).sum(axis=2)
     distance[~holds | ~np.isfinite(distance)] = np.inf
+    alone = (np.isfinite(distance) & (by == 0.0).any(axis=2)).any(axis=1)
     best = distance.argmin(axis=1)
     rows = np.arange(len(pairs))
-    return PairMoves(by[rows, best], distance[rows, best])
+    return PairMoves(by[rows, best], distance[rows, best], alone)

@@ -129,6 +129,8 @@ def test_a_lone_option_has_a_value_unless_what_follows_is_an_option_or_a_file():
     assert with_bare_combine(["mine", "--combine", "a.csv"]) == ["mine", "--combine=*", "a.csv"]
     assert with_bare_combine(["--combine"]) == ["--combine=*"]
     assert with_bare_combine(["--combine", "pole angle"]) == ["--combine", "pole angle"]
+    long = "; ".join(["hull angular velocity"] * 30)  # longer than a file's name can be
+    assert with_bare_combine(["--combine", long]) == ["--combine", long]
     assert with_bare_combine(["--combine", "docs"]) == ["--combine=*", "docs"]
     named = ["mine", "a.csv", "--combine", "one, other", "--combine", "--out", "x"]
     assert with_bare_combine(named) == [*named[:4], "--combine=*", "--out", "x"]

@@ -13,6 +13,7 @@ from sarl_core.environments.formulas import Formula
 from sarl_core.explaining.state_path import PathFinder
 from sarl_core.shielding.crossings import crossings, numbers_at, places_of
 from sarl_core.shielding.neighbourhood import Neighbourhood, feature_spreads
+from sarl_core.shielding.pair_moves import pair_moves
 
 NAMES = ("gap", "speed", "lead")
 
@@ -122,6 +123,18 @@ def test_two_changes_are_the_nearest_that_let_a_rule_apply_where_one_does_not(se
             if len(rows) and not rule.applies(extend(state[None], features))[0]:
                 # One alone that does it is not said a second time with another.
                 assert place in alone or said[place] <= way[rows].min() + 1e-5
+
+
+def test_two_that_go_less_far_do_not_hide_one_that_does_it_alone() -> None:
+    # One alone has to go 4, both together 0.8 each.
+    normals, room = np.array([[-1.0, -0.25], [-0.25, -1.0]]), np.array([-1.0, -1.0])
+    moves = pair_moves(normals, room, np.array([[0, 1]]), np.ones(2))
+    assert moves.by[0] == pytest.approx([0.8, 0.8])
+    assert moves.distance[0] == pytest.approx(1.6)
+    assert moves.alone[0]
+    never = pair_moves(np.array([[1.0, 0.0], [-1.0, 0.0]]), room, np.array([[0, 1]]), np.ones(2))
+    assert np.isinf(never.distance[0])
+    assert not never.alone[0]
 
 
 @example([3.4028234663852886e38, -3.4028234663852886e38])
