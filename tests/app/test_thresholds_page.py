@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from types import SimpleNamespace
 
 import pytest
 from streamlit.testing.v1 import AppTest
@@ -9,6 +10,7 @@ from sarl_core import load_demonstrations, mine_rules, threshold_landscape
 from sarl_core.mining.growing.growth import grow_policy_trees
 from sarl_core.mining.language import share_text
 from sarl_core.mining.thresholds.landscape import PAPER_CONFIDENCES, PAPER_SUPPORTS
+from sarl_dashboard.views.thresholds import maps
 from tests.app.screens import ROUTER, metrics, open_page, texts
 
 DATA = ROUTER.parents[1] / "data" / "demonstrations"
@@ -33,6 +35,18 @@ def set_support(app: AppTest, value: float) -> AppTest:
     app.select_slider(key="support").set_value(value).run()
     assert not app.exception
     return app
+
+
+def test_the_maps_wait_for_the_numbers_at_the_first_visit_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    waits: list[float] = []
+    monkeypatch.setattr(maps, "time", SimpleNamespace(sleep=waits.append))
+    app = open_page("thresholds", data="cartpole")
+    assert len(waits) == 1
+    assert len(app.get("plotly_chart")) == 2
+    app.run()
+    assert len(waits) == 1
 
 
 def test_a_fresh_visit_shows_the_filtered_setting() -> None:

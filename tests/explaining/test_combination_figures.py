@@ -117,6 +117,18 @@ def test_the_picture_is_said_in_words_and_has_the_colours_of_the_actions() -> No
     assert picture.count("<polygon") == 1
 
 
+def test_all_combinations_are_drawn_unless_it_says_how_many() -> None:
+    data = demonstrated()
+    (dimension,) = label_dimensions(data, 2)
+    (one,) = plots(data, (2, ">", 6.0))
+    every = combinations_html([one] * 8, data.features, dimension)
+    assert every.count("<figure>") == 8
+    assert "the first" not in every
+    some = combinations_html([one] * 8, data.features, dimension, most=6)
+    assert some.count("<figure>") == 6
+    assert "the first 6 of 8 combinations" in some
+
+
 def test_a_rule_without_combinations_has_no_picture() -> None:
     data = demonstrated()
     (dimension,) = label_dimensions(data, 2)

@@ -418,3 +418,14 @@ def test_formulas_are_listed_and_an_infinite_value_is_said_in_words():
     for formula in formulas:
         assert formula in text
     assert re.search(r"far [\d.]+ infinite infinite", text)
+
+
+def test_a_formula_that_is_infinite_somewhere_has_a_bar_all_the_same(cart: Demonstrations) -> None:
+    formula = "way = (pole angle + 0.3 * pole angular velocity) / max(cart velocity, 0)"
+    data = with_formulas(cart, [formula])
+    assert np.isinf(data.observations).any()
+    rules = mine_rules(data, supp_min=0.002, conf_min=0.8)
+    assert any(one.feature == 4 for rule in rules for one in rule.conditions)
+    html = make_report(rules, data, **PLAIN).html
+    assert "nan%" not in html
+    assert "inf%" not in html
