@@ -8,6 +8,7 @@ overlap others: they are tried one by one, in their order, before the tree is wa
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ _FEW = 24
 # Levels they walk before those that have reached a leaf are taken out.
 _LEVELS = 4
 
+_Borders = tuple[tuple[int, float], ...]  # features and thresholds
+
 
 class Matcher:
     """The rules of one action dimension, arranged for finding the one that applies."""
@@ -30,15 +33,10 @@ class Matcher:
 
         Args:
             scanned: Rules to try one by one, first.
-            nodes: The tree of the others, root first.
+            nodes: The tree of the others, root first, children behind their parents.
         """
-        self._scanned = list(scanned)
-        # For single states one flat list of bare tuples (a leaf's rule stands where its left
-        # child would): nothing is faster in plain Python.
-        self._nodes = [
-            (node.feature, node.threshold, node.rule if node.feature < 0 else node.left, node.right)
-            for node in nodes
-        ]
+        self._scanned, self._nodes = list(scanned), list(nodes)
+        self._root = _nested(nodes)
         # For many states arrays. A leaf leads to itself, and asks what changes no margin.
         self._rule = np.array([node.rule for node in nodes], dtype=np.int64)
         self._ends = np.array([node.feature < 0 for node in nodes])
@@ -72,6 +70,10 @@ class Matcher:
         # A file whose mined rules are not of one tree: what its order says, holds.
         return cls([*placed, *others], [NOTHING])
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # What is nested as deep as the tree could not be pickled.
+        return Matcher, (self._scanned, self._nodes)
+
     @property
     def scanned(self) -> tuple[int, ...]:
         """Indices of the rules that are tried one by one, in their order.
@@ -100,22 +102,40 @@ class Matcher:
                     break
             else:
                 return index, margin
-        nodes = self._nodes
-        # Least distance upwards and downwards, each in the sign it comes with.
-        above, below = margin, -margin
-        feature, threshold, left, right = nodes[0]
+        feature, threshold, left, right = self._root
         while feature >= 0:
-            gap = state[feature] - threshold
-            if gap <= 0:
-                if gap > below:
-                    below = gap
-                feature, threshold, left, right = nodes[left]
+            feature, threshold, left, right = left if state[feature] <= threshold else right
+        if not threshold:
+            # Replaced at once, for who asks at the same time.
+            threshold[:] = self._borders(state)
+        upper, lower = threshold
+        for feature, border in upper:
+            distance = border - state[feature]
+            if distance < margin:
+                margin = distance
+        for feature, border in lower:
+            distance = state[feature] - border
+            if distance < margin:
+                margin = distance
+        return left, margin
+
+    def _borders(self, state: list[float]) -> tuple[_Borders, _Borders]:
+        """The nearest thresholds above and below all states that are led where this one is.
+
+        Of the thresholds of one feature on a path the nearest is the same for all of them.
+        """
+        upper: dict[int, float] = {}
+        lower: dict[int, float] = {}
+        node = self._nodes[0]
+        while node.feature >= 0:
+            feature, threshold = node.feature, node.threshold
+            if state[feature] <= threshold:
+                upper[feature] = min(upper.get(feature, threshold), threshold)
+                node = self._nodes[node.left]
             else:
-                if gap < above:
-                    above = gap
-                feature, threshold, left, right = nodes[right]
-        # Plus 0, so that what lies on a threshold is 0 away from it and not -0.
-        return (left if left >= 0 else None), (above if above < -below else -below) + 0.0
+                lower[feature] = max(lower.get(feature, threshold), threshold)
+                node = self._nodes[node.right]
+        return tuple(upper.items()), tuple(lower.items())
 
     def match_batch(
         self, states: NDArray[np.float32]
@@ -179,3 +199,20 @@ class Matcher:
             margins[rows.take(done)] = near.take(done)
             rows, first = rows.take(going), first.take(going)
             nodes, near = nodes.take(going), near.take(going)
+
+
+def _nested(nodes: Sequence[RuleNode]) -> Any:
+    """A tree for single states: tuples in tuples, the fastest there is in plain Python.
+
+    Returns:
+        The root, as (feature, threshold, left, right). In a leaf a list, empty until they are
+        asked for, holds its borders in the place of the threshold, and the left child is its rule.
+    """
+    made: list[Any] = [None] * len(nodes)
+    for place in reversed(range(len(nodes))):
+        node = nodes[place]
+        if node.feature < 0:
+            made[place] = (node.feature, [], None if node.rule < 0 else node.rule, None)
+        else:
+            made[place] = (node.feature, node.threshold, made[node.left], made[node.right])
+    return made[0]

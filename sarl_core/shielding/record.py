@@ -7,6 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+DecisionFields = tuple[Any, Any, tuple[int | None, ...], bool, float, bool, str | None]
+"""The fields of a `Decision`, in their order."""
+
 
 class Decision(NamedTuple):
     """What the shield made of one action; the heart of the flight recorder.
@@ -58,3 +61,31 @@ class BatchDecision(NamedTuple):
     margin: NDArray[np.float64]
     outside: NDArray[np.bool_]
     invalid: NDArray[np.object_]
+
+
+def with_passed(executed: NDArray[Any], proposed: NDArray[Any], unread: list[int]) -> NDArray[Any]:
+    """Executed actions, with those that pass as they are.
+
+    Args:
+        executed: Of B steps.
+        proposed: Of the same, B.
+        unread: Rows of those that pass.
+
+    Returns:
+        B of them; objects where one that passes is no such action.
+    """
+    if not unread:
+        return executed
+    if proposed.dtype != np.object_ and proposed.shape == executed.shape:
+        given = proposed[unread]
+        with np.errstate(over="ignore", invalid="ignore"):
+            held = given.astype(executed.dtype)
+        if np.all((held == given) | (np.isnan(held) & np.isnan(given))):
+            executed[unread] = held
+            return executed
+    objects = np.empty(len(executed), dtype=np.object_)
+    for row, action in enumerate(executed):
+        objects[row] = action
+    for row in unread:
+        objects[row] = proposed[row]
+    return objects

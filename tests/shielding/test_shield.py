@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -142,8 +144,11 @@ def test_a_tree_deeper_than_pythons_calls_is_no_trouble():
     rule = replace(manual("deep", conditions, 1), origin="mined")
     labels = Demonstrations(np.zeros((2, 1)), np.array([0, 1]), np.zeros(2, dtype=int))
     rules = replace(mine_rules(labels, supp_min=0, conf_min=1), rules=(rule,))
-    assert Shield(rules).decide(np.array([9e9], dtype=np.float32), 0).executed == 1
-    assert Shield(rules).decide(np.array([2998.5], dtype=np.float32), 0).executed == 0
+    shield = Shield(rules)
+    for one in (shield, pickle.loads(pickle.dumps(shield)), deepcopy(shield)):
+        above, below = (one.decide(np.array([at], dtype=np.float32), 0) for at in (8e9, 2998.5))
+        assert (above.executed, above.margin) == (1, 8e9 - 2999.0)
+        assert (below.executed, below.margin) == (0, 0.5)
 
 
 # ---- continuous actions
