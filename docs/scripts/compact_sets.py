@@ -75,8 +75,9 @@ _WALKER = Plan(
     rounds=16,
     episodes=12,
     divider=15,
-    turns=1,
-    search_episodes=4,
+    turns=3,
+    search_episodes=8,
+    search_limit=400,  # a quarter of its time: it walks as it begins
     validation=64,
     report=1_000,
     choose="failures",
@@ -94,7 +95,7 @@ SETS = {
     ),
     "lunar_lander_compact": RuleSetPlan(
         "lunar_lander",
-        replace(_LANDER, max_rules=19, rounds=64, turns=2, search_episodes=8, search_starts=32),
+        replace(_LANDER, max_rules=19, rounds=48, turns=4, search_episodes=8, search_starts=24),
     ),
     "lunar_lander_continuous_combined": RuleSetPlan(
         "lunar_lander_continuous", _CONTINUOUS_LANDER, "every"

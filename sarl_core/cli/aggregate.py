@@ -123,9 +123,10 @@ def aggregate(
         typer.Option(
             "--search-limit",
             metavar="STEPS",
-            help="With --refine: let the episodes of the search go on for so many steps where the "
-            "environment would end them earlier. Where all that is tried achieves all there is, "
-            "that tells apart what would fail later.",
+            help="With --refine: the episodes of the search end after so many steps, rather than "
+            "where the environment ends them. More tell apart what would fail later, where all "
+            "that is tried achieves all there is; fewer leave time for more episodes, where what "
+            "acts goes on as it begins.",
             show_default="the environment's own",
         ),
     ] = None,

@@ -59,12 +59,19 @@ class Splits:
             The thresholds with their neighbours.
         """
         distinct = np.unique(thresholds)
-        ordered = np.sort(values).astype(np.float64)
-        at = np.searchsorted(ordered, distinct, side="right")
-        framed = np.concatenate([[-np.inf], ordered, [np.inf]])
-        inner = ordered[np.searchsorted(ordered, 0.0, "right") : np.searchsorted(ordered, 1.0)]
+        ordered = np.sort(values)
+        # Searched for as numbers of the same kind, so that no state is copied once more.
+        with np.errstate(over="ignore"):
+            largest = distinct.astype(np.float32)
+        largest = np.where(largest > distinct, np.nextafter(largest, np.float32(-np.inf)), largest)
+        at = np.searchsorted(ordered, largest, side="right")
+        below, above = np.full(len(at), -np.inf), np.full(len(at), np.inf)
+        some, others = at > 0, at < len(ordered)
+        below[some], above[others] = ordered[at[some] - 1], ordered[at[others]]
+        zeros = np.searchsorted(ordered, np.float32(0), side="right")
         within = len(ordered) > 0 and ordered[0] >= 0.0 and ordered[-1] <= 1.0
-        return cls(distinct, framed[at], framed[at + 1], bool(within and not len(inner)))
+        binary = bool(within and zeros == np.searchsorted(ordered, np.float32(1)))
+        return cls(distinct, below, above, binary)
 
     @classmethod
     def together(cls, several: Sequence[Splits]) -> Splits:

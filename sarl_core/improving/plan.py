@@ -35,8 +35,9 @@ class Plan:
         projection: How the shield replaces a continuous action.
         turns: Of the refinement that follows; 0 for none.
         search_episodes: For each neighbour that it tries.
-        search_limit: Steps that its episodes may take where the environment would end them
-            earlier, so that what fails later is told apart, too; None for the environment's own.
+        search_limit: Steps after which its episodes end: more than in the environment, so that
+            what fails later is told apart, too, or fewer, so that there is time for more of them;
+            None for the environment's own.
         search_starts: Of how many rounds the rules are moved before the best of them is gone on
             with; as `Refinement` does it where None.
         validation: Episodes by which the best of all is chosen in the end.

@@ -29,6 +29,9 @@ _ROUNDS_USED = 12
 # What imitates best is often not what acts best, above all of few rules: each round is offered
 # another half of the pairs, and which were good ones is seen from how it does.
 _FEWEST_HALVED = 4
+# Of more, chance offers so much that trees without any combination may drive better: these are
+# grown in every other round.
+_MANY_PAIRS = 60
 # A label with less than 2 % is one the expert does not want; how much less says nothing.
 _LEAST_LOG_PROBABILITY = -4.0
 
@@ -240,14 +243,16 @@ class Answers:
             column(self._episodes),
             column(self._steps),
         ).deriving(self._derived if derived is None else derived)
-        if derived is not None or not self._combined:
+        if derived is not None or not (offered := self._offered(rounds)):
             return pairs
-        return with_combinations(pairs, pairs=self._offered(rounds), divider=self._divider)
+        return with_combinations(pairs, pairs=offered, divider=self._divider)
 
     def _offered(self, rounds: int) -> Sequence[Pair]:
         """The pairs of features that may be combined after so many rounds."""
         if not rounds or len(self._combined) < _FEWEST_HALVED:
             return self._combined
+        if len(self._combined) > _MANY_PAIRS and rounds % 2:
+            return ()
         generator = np.random.default_rng((self._seed, rounds))
         count = (len(self._combined) + 1) // 2
         chosen = generator.choice(len(self._combined), count, replace=False)

@@ -14,7 +14,11 @@ from sarl_core.mining.rules import Bounds
 
 
 def evidence(
-    low: float = -math.inf, high: float = math.inf, *, at_rule: tuple[float, ...] = (0, 0, 1.0, 0)
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    at_rule: tuple[float, ...] = (0, 0, 1.0, 0),
+    infinite: float = 0.0,
 ) -> FeatureEvidence:
     """Four bins from 0 to 8."""
     return FeatureEvidence(
@@ -23,6 +27,7 @@ def evidence(
         np.linspace(0.0, 8.0, 5),
         np.array([0.5, 0.25, 0.25, 0.0]),
         np.array(at_rule, dtype=float),
+        infinite,
     )
 
 
@@ -75,6 +80,13 @@ def test_every_bin_says_what_is_in_it_and_an_empty_one_keeps_its_room() -> None:
         "4 to 6 m: 25 % of all states, 100 % of those of the rule",
     ]
     assert html.count("<u") == 4
+
+
+def test_states_that_no_bin_can_hold_are_told() -> None:
+    assert "infinite" not in drawn(evidence(2.0))
+    assert "(infinite in 12 % of all states, drawn at the ends)" in drawn(
+        evidence(2.0, infinite=0.12)
+    )
 
 
 def test_a_figure_is_told_in_words_and_in_signs() -> None:

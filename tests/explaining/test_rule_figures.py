@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sarl_core import Demonstrations, PolicyTree, RuleSet, grow_policy_trees, mine_rules
+from sarl_core import (
+    Demonstrations,
+    PolicyTree,
+    RuleSet,
+    grow_policy_trees,
+    mine_rules,
+    with_formulas,
+)
 from sarl_core.explaining.figures import tree as figures
 from sarl_core.explaining.html.path import path_table
 from sarl_core.explaining.tables.rule_evidence import (
@@ -58,6 +65,20 @@ def test_evidence_of_a_feature_is_that_of_its_states(
             one.edges[:-1] < one.bounds.high + width
         )
         assert one.at_rule[~inside].sum() == 0.0
+
+
+def test_evidence_tells_how_many_states_are_infinite(lander_like: Demonstrations) -> None:
+    first = lander_like.features[0].name
+    made = with_formulas(lander_like, [f"way = 1 / max({first}, 0)"])
+    trees = grow_policy_trees(made)
+    rules = mine_rules(trees, supp_min=0.0, conf_min=1.0)
+    of_way = len(made.features) - 1
+    rule = next(one for one in rules if any(b.feature == of_way for b in one.bounds))
+    found = {one.feature: one for one in feature_evidence(made, trees[0], rule)}
+    share = float(np.mean(lander_like.observations[:, 0] <= 0))
+    assert 0.0 < share < 1.0
+    assert found[of_way].infinite == pytest.approx(share)
+    assert all(one.infinite == 0.0 for feature, one in found.items() if feature != of_way)
 
 
 def test_examples_are_states_of_the_rule(

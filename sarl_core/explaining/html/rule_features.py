@@ -79,7 +79,10 @@ def _figure(one: FeatureEvidence, feature: Feature, colour: str) -> tuple[str, M
         height=132,
         tips=_tips(one, feature),
     )
-    return short_condition(one.bounds, feature), drawn
+    above = short_condition(one.bounds, feature)
+    if one.infinite:
+        above += f" (infinite in {share_text(one.infinite)} of all states, drawn at the ends)"
+    return above, drawn
 
 
 def _bars(

@@ -56,6 +56,7 @@ class FeatureEvidence:
         edges: Of B bins, (B + 1,); values outside count to the outermost.
         everywhere: Share of all states in each bin, (B,).
         at_rule: Share of the rule's states in each bin, (B,); zeros where no state is its.
+        infinite: Share of all states in which a formula is infinite; they count to the outermost.
     """
 
     feature: int
@@ -63,6 +64,7 @@ class FeatureEvidence:
     edges: NDArray[np.float64]
     everywhere: NDArray[np.float64]
     at_rule: NDArray[np.float64]
+    infinite: float
 
 
 def path_steps(tree: PolicyTree, node: int) -> tuple[PathStep, ...]:
@@ -128,6 +130,7 @@ def feature_evidence(
                 edges,
                 _shares(values, edges),
                 _shares(values[rows], edges),
+                int(np.isinf(values).sum()) / max(len(values), 1),
             )
         )
     return tuple(evidence)

@@ -32,7 +32,7 @@ _STATES_A_BIN = 4  # of a node, at least, before neighbouring bins are taken tog
 _SORTED = 500  # states that are sorted rather than counted, where many nodes are to come of them
 _MANY_NODES = 8
 _WAITING = 64  # parts at most that are sorted, or wait for it, or to be taken
-_AT_ONCE = 30_000  # states whose features are counted in one go: of more, a feature fills the cache
+_AT_ONCE = 6_000  # states whose features are counted in one go: of more, they fill the cache
 
 
 @dataclass(eq=False)
@@ -123,10 +123,11 @@ def best_query(counts: NDArray[np.int64]) -> Query | None:
     above = np.einsum("l,dlb->db", -2.0 * total, below)
     above += squares
     above += total @ total
-    purity = squares / np.maximum(n_below, 1.0)
-    above /= np.maximum(n_above, 1.0)
-    purity += above
-    purity[(n_below == 0) | (n_above == 0)] = -1.0
+    with np.errstate(invalid="ignore"):  # 0/0 where no state is on one side
+        squares /= n_below
+        above /= n_above
+        above += squares
+    purity = np.fmax(above, -1.0, out=above)
     feature, first = divmod(int(purity.argmax()), bins - 1)
     if purity[feature, first] < 0.0:
         return None
@@ -215,6 +216,7 @@ class _Part:
     Attributes:
         node: Its number.
         depth: Queries above it.
+        of_labels: How many of its states have each label, (labels,).
         rows: The states, (n,).
         keys: Of each feature, label * `BINS` + bin, (d, n).
         counts: By feature, label and bin; None where they were not counted yet.
@@ -222,6 +224,7 @@ class _Part:
 
     node: int
     depth: int
+    of_labels: NDArray[np.int64]
     rows: NDArray[np.signedinteger]
     keys: NDArray[np.unsignedinteger]
     counts: NDArray[np.int64] | None = None
@@ -249,17 +252,21 @@ class _Growth:
         self, numbers: NDArray[np.uint16], counts: Sequence[int], labels: NDArray[np.int64]
     ) -> list[_Part]:
         """What to begin with: states, (d, N), with so many bins, d, and these labels, (N,)."""
-        present = np.unique(labels)
+        of_labels = np.bincount(labels)
+        present = np.flatnonzero(of_labels)
         self.labels = len(present)
         # Bins of a feature with few values lie far apart, so that they stay apart when others are
         # taken together.
         self.spread = np.log2(BINS // np.array(counts)).astype(np.uint16)
         kind = np.uint16 if self.labels * BINS <= 2**16 else np.uint32
         keys = np.left_shift(numbers, self.spread[:, None], dtype=kind)
-        keys += np.multiply(np.searchsorted(present, labels), BINS, dtype=kind, casting="unsafe")
+        first_keys = np.zeros(len(of_labels), dtype=kind)
+        first_keys[present] = BINS * np.arange(self.labels)
+        keys += first_keys[labels]
         # One number a state is held of each, and there are fewer nodes than twice the states.
         place = np.int32 if 2 * len(labels) < 2**31 else np.int64
-        return [_Part(0, 0, np.arange(len(labels), dtype=place), keys)] if len(labels) else []
+        rows: NDArray[np.signedinteger] = np.arange(len(labels), dtype=place)
+        return [_Part(0, 0, of_labels[present], rows, keys)] if len(labels) else []
 
     def grow(self, waiting: list[_Part], n: int) -> tuple[TreeStructure, NDArray[np.int64]]:
         """Grow it over n states; of the parts that wait nobody else should hold any."""
@@ -290,10 +297,8 @@ class _Growth:
         return self._in_order(leaves)
 
     def _is_split(self, part: _Part) -> bool:
-        if len(part.rows) < self.least or part.depth == self.max_depth:
-            return False
-        labels = part.keys[0] // BINS
-        return bool((labels != labels[0]).any())
+        n = len(part.rows)
+        return n >= self.least and part.depth != self.max_depth and int(part.of_labels.max()) < n
 
     def _split(self, part: _Part) -> list[_Part]:
         """Choose a query and make two nodes; none where no border parts the states."""
@@ -314,7 +319,10 @@ class _Growth:
         self.feature[part.node] = query.feature
         self.border[part.node] = border >> int(self.spread[query.feature])
         below = []
-        for side, inside in ((self.left, goes_left), (self.right, ~goes_left)):
+        for side, inside, of_labels in (
+            (self.left, goes_left, query.left),
+            (self.right, ~goes_left, part.of_labels - query.left),
+        ):
             side[part.node] = len(self.feature)
             self.feature.append(LEAF)
             self.border.append(0.0)
@@ -323,7 +331,11 @@ class _Growth:
             some = np.flatnonzero(inside)
             below.append(
                 _Part(
-                    side[part.node], part.depth + 1, part.rows[some], part.keys.take(some, axis=1)
+                    side[part.node],
+                    part.depth + 1,
+                    of_labels,
+                    part.rows[some],
+                    part.keys.take(some, axis=1),
                 )
             )
         smaller, larger = sorted(below, key=lambda one: len(one.rows))
