@@ -298,7 +298,8 @@ class _Growth:
 
     def _is_split(self, part: _Part) -> bool:
         n = len(part.rows)
-        return n >= self.least and part.depth != self.max_depth and int(part.of_labels.max()) < n
+        pure = n in part.of_labels.tolist()
+        return n >= self.least and part.depth != self.max_depth and not pure
 
     def _split(self, part: _Part) -> list[_Part]:
         """Choose a query and make two nodes; none where no border parts the states."""
@@ -315,7 +316,7 @@ class _Growth:
             return []
         # The last of the bins that were taken together, and of those that were spread.
         border = (query.border + 1) * (BINS // bins) - 1
-        goes_left = part.keys[query.feature] % BINS <= border
+        goes_left = part.keys[query.feature] & (BINS - 1) <= border
         self.feature[part.node] = query.feature
         self.border[part.node] = border >> int(self.spread[query.feature])
         below = []

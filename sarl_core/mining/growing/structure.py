@@ -140,8 +140,10 @@ def tree_of_counts(
         inner = level[left[level] != LEAF]
         start[left[inner]] = start[inner]
         start[right[inner]] = start[inner] + samples[left[inner]]
+    place = np.zeros(n, dtype=np.min_scalar_type(n))  # numbers of two bytes are sorted fastest
+    place[np.argsort(start, kind="stable")] = np.arange(n)
     # Stable, so that the rows of a leaf keep their order in time.
-    order = np.argsort(start[leaves], kind="stable").astype(np.int64)
+    order = np.argsort(place[leaves], kind="stable").astype(np.int64)
     return PolicyTree(
         index=index,
         dimension=dimension,
