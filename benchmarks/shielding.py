@@ -38,8 +38,8 @@ def decision(quick: bool) -> Iterable[Row]:
     yield _decision(quick, "one shield decision, with its record", plain, reach=0.03)
     combined = with_boxes(data.combined_rules(), data.combined())
     yield _decision(quick, "the same, with combinations of two features", combined, reach=0.04)
-    shipped = load_rules("data/rules/lunar_lander_combined.json")
-    yield _decision(quick, "the same, with combinations, shipped rules", shipped, reach=0.04)
+    shipped = load_rules(data.DATA / "rules" / "lunar_lander_combined.json")
+    yield _decision(quick, "the same, with the shipped rules of two features", shipped, reach=0.04)
 
 
 def _decision(quick: bool, what: str, rules: RuleSet, *, reach: float) -> Row:

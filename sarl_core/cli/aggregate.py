@@ -123,10 +123,10 @@ def aggregate(
         typer.Option(
             "--search-limit",
             metavar="STEPS",
-            help="With --refine: the episodes of the search end after so many steps, rather than "
-            "where the environment ends them. More tell apart what would fail later, where all "
-            "that is tried achieves all there is; fewer leave time for more episodes, where what "
-            "acts goes on as it begins.",
+            help="With --refine: the time limit of the search's episodes, in place of the "
+            "environment's own. A longer one tells apart what would fail later, where all that is "
+            "tried reaches the limit; a shorter one leaves time for more episodes, where their "
+            "beginning shows how the rest will be.",
             show_default="the environment's own",
         ),
     ] = None,

@@ -63,7 +63,8 @@ class Splits:
         # Searched for as numbers of the same kind, so that no state is copied once more.
         with np.errstate(over="ignore"):
             largest = distinct.astype(np.float32)
-        largest = np.where(largest > distinct, np.nextafter(largest, np.float32(-np.inf)), largest)
+            before = np.nextafter(largest, np.float32(-np.inf))
+        largest = np.where(largest > distinct, before, largest)
         at = np.searchsorted(ordered, largest, side="right")
         below, above = np.full(len(at), -np.inf), np.full(len(at), np.inf)
         some, others = at > 0, at < len(ordered)

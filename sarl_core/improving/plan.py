@@ -35,9 +35,9 @@ class Plan:
         projection: How the shield replaces a continuous action.
         turns: Of the refinement that follows; 0 for none.
         search_episodes: For each neighbour that it tries.
-        search_limit: Steps after which its episodes end: more than in the environment, so that
-            what fails later is told apart, too, or fewer, so that there is time for more of them;
-            None for the environment's own.
+        search_limit: Time limit of its episodes, in steps: a longer one than the environment's, so
+            that what fails later is told apart, too, or a shorter one, so that there is time for
+            more of them; None for the environment's own.
         search_starts: Of how many rounds the rules are moved before the best of them is gone on
             with; as `Refinement` does it where None.
         validation: Episodes by which the best of all is chosen in the end.
@@ -47,7 +47,7 @@ class Plan:
             None.
         choose: What comes first where the best is chosen.
         combined: Pairs of features of which combinations may be asked about, by their indices in
-            the environment's order; () for none.
+            the environment's order; () for none. Of many, every other round offers none.
     """
 
     max_rules: int

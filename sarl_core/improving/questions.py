@@ -29,8 +29,8 @@ _ROUNDS_USED = 12
 # What imitates best is often not what acts best, above all of few rules: each round is offered
 # another half of the pairs, and which were good ones is seen from how it does.
 _FEWEST_HALVED = 4
-# Of more, chance offers so much that trees without any combination may drive better: these are
-# grown in every other round.
+# Of more, so many borders imitate well by chance that trees without combinations may do better, as
+# those of the walker did (91 pairs): these are grown in every other round.
 _MANY_PAIRS = 60
 # A label with less than 2 % is one the expert does not want; how much less says nothing.
 _LEAST_LOG_PROBABILITY = -4.0
@@ -224,7 +224,8 @@ class Answers:
 
         Args:
             rounds: How many have been taken up by then.
-            derived: What is derived; chosen anew where not given.
+            derived: What is derived; where not given, chosen anew, of many pairs nothing in every
+                other round.
 
         Returns:
             The pairs of the start and of the latest rounds, with what is derived; which

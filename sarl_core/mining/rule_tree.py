@@ -53,7 +53,8 @@ def tree_of(rules: Sequence[Numbered]) -> list[RuleNode] | None:
         rules: Each with its index in the rule set.
 
     Returns:
-        The nodes, root first; None if the rules are not those of one tree.
+        The nodes, root first, children behind their parents; None if the rules are not those of
+        one tree.
     """
     nodes = [NOTHING]
     # A stack and no recursion, because a tree may be deeper than Python's calls may go.

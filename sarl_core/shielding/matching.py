@@ -29,7 +29,7 @@ class Matcher:
     """The rules of one action dimension, arranged for finding the one that applies."""
 
     def __init__(self, scanned: Sequence[Numbered], nodes: Sequence[RuleNode]) -> None:
-        """Lay out the arrays.
+        """Lay out the tree, for single states and for many.
 
         Args:
             scanned: Rules to try one by one, first.
@@ -101,7 +101,7 @@ class Matcher:
                 if not (gap <= 0 if op == "<=" else gap > 0):  # NaN is on neither side
                     break
             else:
-                return index, margin
+                return index, margin + 0.0
         feature, threshold, left, right = self._root
         while feature >= 0:
             feature, threshold, left, right = left if state[feature] <= threshold else right
@@ -117,7 +117,8 @@ class Matcher:
             distance = state[feature] - border
             if distance < margin:
                 margin = distance
-        return left, margin
+        # Plus 0, so that what lies on a threshold is 0 away from it and not -0.
+        return left, margin + 0.0
 
     def _borders(self, state: list[float]) -> tuple[_Borders, _Borders]:
         """The nearest thresholds above and below all states that are led where this one is.
@@ -126,15 +127,13 @@ class Matcher:
         """
         upper: dict[int, float] = {}
         lower: dict[int, float] = {}
-        node = self._nodes[0]
-        while node.feature >= 0:
-            feature, threshold = node.feature, node.threshold
-            if state[feature] <= threshold:
-                upper[feature] = min(upper.get(feature, threshold), threshold)
-                node = self._nodes[node.left]
-            else:
-                lower[feature] = max(lower.get(feature, threshold), threshold)
-                node = self._nodes[node.right]
+        feature, threshold, left, right = self._root
+        while feature >= 0:
+            node = left if state[feature] <= threshold else right
+            known = upper if node is left else lower
+            if feature not in known or (threshold < known[feature]) == (node is left):
+                known[feature] = threshold
+            feature, threshold, left, right = node
         return tuple(upper.items()), tuple(lower.items())
 
     def match_batch(

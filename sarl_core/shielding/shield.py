@@ -212,14 +212,14 @@ class Shield:
         return Decision(*self.decision_fields(observation, action))
 
     def decision_fields(self, observation: Any, action: Any) -> DecisionFields:
-        """As `decide`, for who makes a record of his own.
+        """As `decide`, for those who make a record of their own, as `ShieldedEnv` does.
 
         Args:
             observation: As for `decide`.
             action: As for `decide`.
 
         Returns:
-            The fields of the decision, without the twentieth of the time that naming them takes.
+            The fields of the decision, without the time that it takes to name them.
 
         Raises:
             InputError: As `decide`.

@@ -112,25 +112,26 @@ def test_states_in_which_a_formula_has_no_value_are_not_learned_from(cart, small
     assert found.is_finished
 
 
-def test_episodes_of_the_search_alone_go_on_beyond_the_limit(cart, small_search, monkeypatch):
+@pytest.mark.parametrize("limit", [700, 60])
+def test_episodes_of_the_search_alone_have_another_limit(cart, small_search, monkeypatch, limit):
     longest = {}
     play = Refinement._play
 
     def noted(self, *arguments, **named):
         played = play(self, *arguments, **named)
-        limit = self._evaluator.env_id
-        longest[limit] = max(longest.get(limit, 0), int(played.lengths.max()))
+        where = self._evaluator.env_id
+        longest[where] = max(longest.get(where, 0), int(played.lengths.max()))
         return played
 
     monkeypatch.setattr(Refinement, "_play", noted)
     plan = Plan(
-        max_rules=4, rounds=1, episodes=4, validation=8, report=8, turns=1, search_limit=700
+        max_rules=4, rounds=1, episodes=4, validation=8, report=8, turns=1, search_limit=limit
     )
     found = aggregate(cart, plan)
     (environment,) = longest
-    assert (environment.id, environment.keywords) == ("CartPole-v1", {"max_episode_steps": 700})
-    assert 500 < longest[environment] <= 700
-    assert found.reported.lengths.max() <= 500
+    assert (environment.id, environment.keywords) == ("CartPole-v1", {"max_episode_steps": limit})
+    assert min(limit, 500) <= longest[environment] <= limit
+    assert 60 < found.reported.lengths.max() <= 500
     assert found.env_id == "CartPole-v1"
 
 

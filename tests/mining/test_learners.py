@@ -149,6 +149,21 @@ def test_a_leaf_that_bins_leave_mixed_is_told_as_it_is(few_bins):
     assert len(mine_rules([tree], supp_min=0.0, conf_min=1.0)) == 0
 
 
+def test_of_a_billion_states_every_query_parts_some():
+    """Where squares are no longer exact, a border with nothing on one side is none all the same."""
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        total = rng.multinomial(1_000_000_000, rng.dirichlet(np.ones(3)))
+        counts = np.zeros((3, 3, 8), dtype=np.int64)
+        for feature, filled in enumerate((2, 2, 5)):  # and the last bins hold nothing
+            for label in range(3):
+                shares = rng.dirichlet(np.ones(filled))
+                counts[feature, label, :filled] = rng.multinomial(total[label], shares)
+        query = histogram.best_query(counts)
+        assert query is not None
+        assert 0 < query.left.sum() < 1_000_000_000
+
+
 def test_one_label_alone_and_one_value_alone_are_one_leaf():
     states = np.random.default_rng(0).normal(size=(50, 3)).astype(np.float32)
     (tree,) = histogram_trees(Demonstrations(states, np.zeros(50, int), np.zeros(50, int)))

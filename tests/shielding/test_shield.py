@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 from copy import deepcopy
 from dataclasses import replace
@@ -149,6 +150,30 @@ def test_a_tree_deeper_than_pythons_calls_is_no_trouble():
         above, below = (one.decide(np.array([at], dtype=np.float32), 0) for at in (8e9, 2998.5))
         assert (above.executed, above.margin) == (1, 8e9 - 2999.0)
         assert (below.executed, below.margin) == (0, 0.5)
+
+
+def test_the_margin_is_to_the_nearest_of_all_thresholds_of_a_path():
+    """A rule file may hold a path whose later queries of a feature are the looser ones."""
+    conditions = [[(0, "<=", 1.0), (0, "<=", 5.0), (1, ">", -0.0), (1, ">", -3.0)]]
+    conditions += [[*conditions[0][:2], (1, "<=", -0.0)], [(0, ">", 1.0), (0, ">", -2.0)]]
+    rules = tuple(
+        replace(manual(f"r{place}", path, 1), origin="mined")
+        for place, path in enumerate(conditions)
+    )
+    labels = Demonstrations(np.zeros((2, 2)), np.array([0, 1]), np.zeros(2, dtype=int))
+    shield = Shield(replace(mine_rules(labels, supp_min=0, conf_min=1), rules=rules))
+    assert shield.scanned == ()
+    grid = np.array([-1.0, 0.0, 0.5, 1.0, 1.25, 4.0], dtype=np.float32)
+    states = np.array([(x, y) for x in grid for y in grid], dtype=np.float32)
+    batch = shield.decide_batch(states, np.zeros(len(states), dtype=int))
+    for row, state in enumerate(states):
+        number = scan(rules, state, 0)
+        at = [abs(float(state[f]) - t) for f, _, t in conditions[number]]
+        decision = shield.decide(state, 0)
+        assert decision.rules == (number,)
+        # Nothing lies -0 away from a threshold, one by one or together.
+        for margin in (decision.margin, float(batch.margin[row])):
+            assert (margin, math.copysign(1.0, margin)) == (min(at), 1.0)
 
 
 # ---- continuous actions

@@ -137,6 +137,7 @@ def test_the_record_says_what_happened(cartpole):
             observation, reward, _, _, info = env.step(1)
             record = info["shield"]
             assert (record.episode, record.step) == (episode, step)
+            assert len(record) == len(record._fields)
             assert np.array_equal(record.observation, state)
             assert record.intervened == (record.executed != record.proposed)
             assert reward == (0.75 if record.intervened else 1.0)

@@ -56,7 +56,7 @@ class FeatureEvidence:
         edges: Of B bins, (B + 1,); values outside count to the outermost.
         everywhere: Share of all states in each bin, (B,).
         at_rule: Share of the rule's states in each bin, (B,); zeros where no state is its.
-        infinite: Share of all states in which a formula is infinite; they count to the outermost.
+        infinite: Share of all states in which a formula is infinite, which the outermost count.
     """
 
     feature: int

@@ -123,11 +123,12 @@ def best_query(counts: NDArray[np.int64]) -> Query | None:
     above = np.einsum("l,dlb->db", -2.0 * total, below)
     above += squares
     above += total @ total
-    with np.errstate(invalid="ignore"):  # 0/0 where no state is on one side
+    nothing = (n_below == 0) | (n_above == 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
         squares /= n_below
         above /= n_above
-        above += squares
-    purity = np.fmax(above, -1.0, out=above)
+    purity = np.add(above, squares, out=above)
+    purity[nothing] = -1.0
     feature, first = divmod(int(purity.argmax()), bins - 1)
     if purity[feature, first] < 0.0:
         return None
@@ -340,7 +341,8 @@ class _Growth:
                 )
             )
         smaller, larger = sorted(below, key=lambda one: len(one.rows))
-        if len(larger.rows) > _AT_ONCE:  # of fewer, counting is as fast
+        # Of fewer, counting is as fast; and what waits should not take more than its states do.
+        if len(larger.rows) > max(_AT_ONCE, self.labels * BINS):
             few = self._counted(smaller, bins)
             below = [replace(smaller, counts=few), replace(larger, counts=counts - few)]
         return below
