@@ -121,11 +121,14 @@ def decimal_text(value: float) -> str:
     """A number with every digit it has, and without an exponent unless it needs many zeros.
 
     Args:
-        value: A finite number.
+        value: A number.
 
     Returns:
-        As "293.42", "1700000012" or "1.2e-09"; reads back as the same number.
+        As "293.42", "1700000012" or "1.2e-09", which reads back as the same number; words for what
+        is infinite, as a formula may be, or no number.
     """
+    if not math.isfinite(value):
+        return "not a number" if math.isnan(value) else f"{'-' if value < 0 else ''}infinite"
     if value == 0:
         return "0"
     if 1e-4 <= abs(value) < 1e15:

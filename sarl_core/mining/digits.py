@@ -58,7 +58,7 @@ def value_text(value: float, feature: Feature, bounds: Iterable[Bounds]) -> str:
         each bound. As "yes" or "no" where it says which word a column holds.
     """
     if not math.isfinite(value):
-        return _no_number(value)
+        return decimal_text(value)
     if feature.indicator is not None and value in (0.0, 1.0):
         return "yes" if value else "no"
     limits = [
@@ -82,12 +82,7 @@ def amount_text(
         those beside it, or not to leave its interval as that is written.
     """
     if not math.isfinite(amount):
-        return _no_number(amount)
+        return decimal_text(amount)
     low, high = (-math.inf, math.inf) if dimension is None else dimension.written_interval(amount)
     others = [other for other in beside if math.isfinite(other) and other != amount]
     return decimal_text(written_value(amount, others, within=(low, high)))
-
-
-def _no_number(value: float) -> str:
-    """What is said of NaN and of the infinite."""
-    return "not a number" if math.isnan(value) else f"{'-' if value < 0 else ''}infinite"

@@ -89,7 +89,9 @@ def test_of_several_seeds_the_one_in_the_middle_is_shipped() -> None:
     sets = {name: seeds for name, seeds in known.items() if not name.endswith("_expert")}
     assert "cartpole_combined" in sets
     for name, seeds in sets.items():
-        assert sorted(one["seed"] for one in seeds) == list(range(5))
+        assert {one["seed"] for one in seeds} <= set(range(5))
+        if len(seeds) < 5:  # begun, and shipped once all of them are known
+            continue
         card = json.loads(card_path(FOLDER / f"{name}.json").read_text(encoding="utf-8"))
         middle = median(seeds)
         assert card["seed"] == middle["seed"]

@@ -150,7 +150,7 @@ def within(value: float, row: FeatureRow) -> str:
         words for what is infinite, as a formula may be.
     """
     if math.isinf(value):
-        return "infinite" if value > 0 else "negatively infinite"
+        return decimal_text(value)
     width = row.high - row.low
     if math.isfinite(width) and abs(value) <= 1e-4 * width:
         return "0"
