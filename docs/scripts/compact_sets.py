@@ -95,7 +95,7 @@ SETS = {
     ),
     "lunar_lander_compact": RuleSetPlan(
         "lunar_lander",
-        replace(_LANDER, max_rules=19, rounds=48, turns=4, search_episodes=8, search_starts=24),
+        replace(_LANDER, max_rules=19, rounds=64, turns=2, search_episodes=8, search_starts=32),
     ),
     "lunar_lander_continuous_combined": RuleSetPlan(
         "lunar_lander_continuous", _CONTINUOUS_LANDER, "every"
