@@ -37,7 +37,7 @@ def follow(app: AppTest, label: str) -> None:
         del app.query_params[name]
     for name, value in parse_qsl(link.query_string):
         app.query_params[name] = value
-    app.switch_page(page_file(link.page)).run()
+    app.switch_page(page_file(link.page or "overview")).run()  # whose address is empty
 
 
 def page_file(name: str) -> str:

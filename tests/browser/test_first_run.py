@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from playwright.sync_api import Page, expect
 
 from sarl_dashboard.components.journey.first_run import STEPS
@@ -30,6 +32,21 @@ def test_the_first_run_goes_from_the_overview_to_a_replay_and_back(screen: Page)
     expect(screen.get_by_role("heading", name="Overview", level=1)).to_be_visible()
     settle(screen)
     expect(screen.locator(".st-key-first_run")).to_have_count(0)
+    again = screen.locator(".st-key-first_run_again")  # no longer what is to be done first
+    expect(again).to_contain_text("Begin the first run")
+
+
+def test_what_is_done_is_a_list_whose_lines_lie_below_each_other(screen: Page) -> None:
+    for width in (1440, 400):
+        screen.set_viewport_size({"width": width, "height": 900})
+        visit(screen, "/", "Overview")
+        boxes = [link.bounding_box() for link in screen.locator(".st-key-stages a").all()]
+        assert len(boxes) == 7
+        for above, below in pairwise(boxes):
+            assert above is not None
+            assert below is not None
+            assert above["height"] >= 24  # to be hit with a finger
+            assert above["y"] + above["height"] <= below["y"] + 1
 
 
 def test_a_question_mark_leads_to_the_words(screen: Page) -> None:

@@ -11,7 +11,7 @@ from sarl_dashboard.state.rule_files import FEWEST
 from sarl_dashboard.state.thresholds import THRESHOLDS
 from sarl_dashboard.state.url import set_url_choice, url_choice
 
-_STEP, _DONE = "first_run", "_first_run_done"
+_STEP, _DONE = "first_run", "done"
 _TASK = {"data": DEFAULT_DATA}
 _SLIDERS = {**_TASK, "set": THRESHOLDS}
 _SIX_RULES = {**_TASK, "set": FEWEST}
@@ -90,18 +90,18 @@ def take_up() -> None:
 
     Before the URL is written, that every page and link of the run has it at once.
     """
-    url_choice("first_run", ["", *(str(number + 1) for number in range(len(STEPS)))], "")
+    url_choice(_STEP, ["", *(str(number + 1) for number in range(len(STEPS))), _DONE], "")
 
 
 def step_at_hand() -> int | None:
     """Which step is next, from 0; None where there is no first run under way."""
     number = st.session_state.get(f"_{_STEP}")
-    return int(number) - 1 if number else None
+    return int(number) - 1 if number and number != _DONE else None
 
 
 def first_run_done() -> bool:
-    """Whether it was gone through to the end in this session."""
-    return bool(st.session_state.get(_DONE))
+    """Whether it was gone through to the end."""
+    return bool(st.session_state.get(f"_{_STEP}") == _DONE)
 
 
 def link_to_step(number: int, label: str, icon: str, *, key: str) -> None:
@@ -151,10 +151,15 @@ def show_first_run(page: str) -> None:
             if page != step.page:
                 link_to_step(number, f"Go on with {step.page}", _ON, key="first_run_on")
             elif last:
-                if st.button("Done", key="first_run_on", type="primary", icon=":material/check:"):
-                    st.session_state[_DONE] = True
-                    _end()
-                    st.switch_page("overview.py", query_params=_TASK)
+                # A link: had the server changed the page, a part of this one that asks to be drawn
+                # again and again could ask for it once more, and the next page would be emptied.
+                with st.container(key="first_run_on", width="content"):
+                    st.page_link(
+                        "overview.py",
+                        label="Done",
+                        icon=":material/check:",
+                        query_params={_STEP: _DONE},
+                    )
             else:
                 after = STEPS[number + 1].page
                 link_to_step(number + 1, f"Next: {after}", _ON, key="first_run_on")
