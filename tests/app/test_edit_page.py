@@ -338,3 +338,20 @@ def test_the_page_says_where_edits_are_that_nobody_kept_as_rules() -> None:
     with Library() as library:
         item = library.item("".join(app.query_params["edits"]))
     assert item.details["made_on"] == "At the thresholds, Cart Pole"
+
+
+def test_what_a_rule_of_a_file_does_is_counted_in_the_states_at_hand() -> None:
+    lander = load_demonstrations(DATA / "lunar_lander.parquet")
+    rules = RuleSet.load(DATA.parent / "rules" / "lunar_lander_few_combined.json")
+    (column,) = Shield(rules).rules_in_force(lander.observations).T  # of one action dimension
+    for place, rule in enumerate(rules):
+        decided = column == place
+        right = (lander.actions[decided] == rule.action).mean()
+        assert rule.samples != decided.sum()  # it was built from other states
+        said = (
+            f"decides {decided.sum():,} demonstrated states, and the expert did as it says in "
+            f"{share_text(right)} of them"
+        )
+        app = open_page("edit", data="lunar_lander", set="fewest, two features", rule=rule.id)
+        assert said in texts(app)
+        assert f"{share_text(rule.confidence)} of {rule.samples:,} states" not in texts(app)

@@ -63,3 +63,13 @@ def test_rules_ask_about_two_features_together_and_a_link_says_which(
         no_trace(same)
     finally:
         other.close()
+
+
+def test_on_a_telephone_what_the_path_asks_is_read_to_its_end(screen: Page) -> None:
+    screen.set_viewport_size({"width": 400, "height": 850})
+    visit(screen, "/rules?set=fewest%2C+two+features", "Rules")
+    beside = screen.locator(".sarl-place em")
+    assert any(len(label) > 50 for label in labels(screen))
+    for label in beside.all():
+        assert label.evaluate("e => e.scrollHeight <= e.clientHeight + 1")
+        assert label.evaluate("e => e.scrollWidth <= e.clientWidth + 1")

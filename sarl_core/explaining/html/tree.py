@@ -32,6 +32,7 @@ _HIT = 8.0  # pixels: what is narrower is not met by the pointer
 _THINNEST = 1.5  # pixels: boxes that are narrower are drawn together
 _BOX = 0.92  # of a row's height
 _LEVELS = 9  # numbered at most
+_LINES = 22  # of text that have room above each other
 
 
 def place_html(
@@ -81,6 +82,7 @@ def place_html(
         dots=[f"left:{x:.2f}%;top:{y:.2f}%" for x, y in points if y >= 0],
         boxes=_boxes(tree, nodes, window),
         queries=_queries(tree, path, window),
+        lines=max(1, int(_LINES * _BOX / height)),
         levels=[
             (percent((depth - top + _BOX / 2) / height), depth)
             for depth in range(top, bottom, -(-height // _LEVELS))

@@ -9,7 +9,7 @@ import streamlit as st
 
 from sarl_core.explaining.words.edits import state_text
 from sarl_core.mining.editing.edits import Edit, Move, Pin, Remove, Switch, Unpin, peers_of
-from sarl_core.mining.language import counted, sentence
+from sarl_core.mining.language import counted, sentence, share_text
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
 from sarl_core.shielding.effects import Verdicts
@@ -43,10 +43,16 @@ def chosen_rule(of: Base, rule: Rule, verdicts: Verdicts) -> str | None:
     """The chosen rule and what can be done to it; gives what the form is to do with it."""
     rule_set, wish = verdicts.rule_set, None
     with st.container(border=True, key="chosen_rule"):
-        st.markdown(f"**{escaped(sentence(rule, rule_set))}**")
+        # What a demanding rule of a file was worth where it was learned is on the page Rules: here
+        # stands what it does in the states that the table counts.
+        st.markdown(f"**{escaped(sentence(rule, rule_set, evidence=rule.forbids))}**")
         at = next(at for at, one in enumerate(rule_set.rules) if one.id == rule.id)
-        states = counted(int(verdicts.decided[at]), edits.basis_of(of).noun)
+        decided = int(verdicts.decided[at])
+        states = counted(decided, edits.basis_of(of).noun)
         decides = f"has a say in {states}" if rule.forbids else f"decides {states}"
+        if decided and verdicts.right is not None:
+            share = share_text(int(verdicts.right[at]) / decided)
+            decides += f", and the expert did as it says in {share} of them"
         st.caption(f"{rule_set.name_of(rule)} · {state_text(rule)} · {decides}")
         with st.container(horizontal=True, gap="small"):
             for button in _buttons(rule, rule_set):
