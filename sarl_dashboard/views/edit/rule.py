@@ -45,7 +45,7 @@ def chosen_rule(of: Base, rule: Rule, verdicts: Verdicts) -> str | None:
     with st.container(border=True, key="chosen_rule"):
         # What a demanding rule of a file was worth where it was learned is on the page Rules: here
         # stands what it does in the states that the table counts.
-        st.markdown(f"**{escaped(sentence(rule, rule_set, evidence=rule.forbids))}**")
+        st.markdown(f"**{escaped(sentence(rule, rule_set, evidence=bool(rule.forbids)))}**")
         at = next(at for at, one in enumerate(rule_set.rules) if one.id == rule.id)
         decided = int(verdicts.decided[at])
         states = counted(decided, edits.basis_of(of).noun)
