@@ -112,13 +112,14 @@ def require(value: object, kind: type | tuple[type, ...], must: str, advice: str
         raise InputError(f"{must} and is {_kind_of(value)}; {advice}")
 
 
-def require_whole(name: str, value: int, least: int) -> None:
-    """Refuse what is no whole number, or too small.
+def require_whole(name: str, value: int, least: int, most: int | None = None) -> None:
+    """Refuse what is no whole number, too small, or too large.
 
     Args:
         name: Of the argument.
         value: As it was given.
         least: The smallest that is allowed.
+        most: The largest; None for any.
 
     Raises:
         InputError: If it is something else.
@@ -126,6 +127,8 @@ def require_whole(name: str, value: int, least: int) -> None:
     require(value, Integral, f"{name} must be a whole number", "give one")
     if value < least:
         raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
+    if most is not None and value > most:
+        raise InputError(f"{name} is {value} and must be at most {most}; give a smaller one")
 
 
 def _kind_of(value: object) -> str:

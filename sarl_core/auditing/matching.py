@@ -19,9 +19,9 @@ from sarl_core.demonstrations.derived import extend
 from sarl_core.demonstrations.recoding import recoded
 from sarl_core.environments.feature_order import (
     NamedFeatures,
+    compared_names,
     line_up,
     only_counts,
-    plain_names,
     shortened,
 )
 from sarl_core.errors import InputError
@@ -149,8 +149,8 @@ def _columns_of(features: Sequence[Feature]) -> list[str]:
 
 def _lacking(wanted: Sequence[str], names: Sequence[str]) -> list[str]:
     """Names that are not among others."""
-    have = plain_names(names)
-    return [name for name in wanted if plain_names([name])[0] not in have]
+    looked_for, have = compared_names(wanted, names)
+    return [name for name, one in zip(wanted, looked_for, strict=True) if one not in have]
 
 
 def _action_places(
@@ -162,8 +162,8 @@ def _action_places(
     if len(names) != len(theirs):
         joined = "or say which of its columns are one action together (--column left+right=action)"
         raise InputError(
-            f"{called} has {counted(len(names), 'action')} ({shortened(names)}) and the rules have "
-            f"{len(theirs)} ({shortened(theirs)}); {_CURE}"
+            f"{_have(called)} {counted(len(names), 'action')} ({shortened(names)}) and the rules "
+            f"have {len(theirs)} ({shortened(theirs)}); {_CURE}"
             + (f", {joined}" if len(names) > len(theirs) else "")
         )
     if len(names) == 1:
@@ -179,7 +179,7 @@ def _action_places(
         if not lacking:
             raise
         raise InputError(
-            f"the rules are for {len(theirs)} actions and {called} has no {shortened(lacking)} "
+            f"the rules are for {len(theirs)} actions and {_have(called)} no {shortened(lacking)} "
             f"({called}: {shortened(names)}); {_naming('action', lacking)}{_CURE}"
         ) from error
     return lined.places, tuple(filter(None, [lined.note]))
@@ -202,16 +202,21 @@ def _feature_places(
         except InputError:
             if not missing:
                 raise
-    have = plain_names(ours)
+    have, wanted = compared_names(ours, theirs)
     if missing or only_counts(ours) or only_counts(theirs) or len(set(have)) < len(have):
-        lacks = f" has no {shortened(missing)}" if missing else f" has {len(ours)}"
+        lacks = f"no {shortened(missing)}" if missing else str(len(ours))
         columns = _lacking(_columns_of(rule_set.source.features), _columns_of(log.observed))
         raise InputError(
-            f"the rules ask about {len(theirs)} features and {called}{lacks} "
+            f"the rules ask about {len(theirs)} features and {_have(called)} {lacks} "
             f"({called}: {shortened(ours)}); {_naming('feature', columns)}{_CURE}"
         )
     note = f"{shortened(further)} of {called} is no feature of the rules and was left out"
-    return [have.index(name) for name in plain_names(theirs)], (note,)
+    return [have.index(name) for name in wanted], (note,)
+
+
+def _have(called: str) -> str:
+    """What is called so, and the verb."""
+    return f"{called} {'have' if called.endswith('s') else 'has'}"
 
 
 def _naming(role: Literal["feature", "action"], lacking: Sequence[str]) -> str:
@@ -260,7 +265,7 @@ def _labels(
             f"({shortened(dimension.label_names)}) and an amount in {called}; {_CURE}"
         )
     own = demonstrated.labels_of(values)
-    wanted, have = plain_names(dimension.label_names), plain_names(demonstrated.labels)
+    wanted, have = compared_names(dimension.label_names, demonstrated.labels)
     numbers = dict(zip(dimension.actions, range(len(wanted)), strict=True))
     if _is_number(demonstrated) and set(have) - set(wanted):
         # Numbers without names: the action is the same number.

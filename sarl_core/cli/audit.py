@@ -131,8 +131,10 @@ def audit(
         from sarl_core.auditing.audit import audit as against
         from sarl_core.auditing.comparison import LogComparison
         from sarl_core.auditing.guards import guard
+        from sarl_core.auditing.reference import reference_of
         from sarl_core.explaining.exports.audit import audit_document
         from sarl_core.mining.rule_set import RuleSet
+        from sarl_core.shielding.shield import Shield
 
         guards = [guard(text) for text in fail_on or ()]
         rule_set = RuleSet.load(rules)
@@ -144,6 +146,10 @@ def audit(
                 demonstrations, None, _said_of(demonstrations, columns), missing
             )
         )
+
+        if demonstrations is not None and mined_from is not None:
+            with _naming(demonstrations):  # what does not fit in them is no fault of the log
+                reference_of(Shield(rule_set), mined_from)
 
         def hold(path: Path | list[Path], steps: Demonstrations | None = None) -> Audit:
             with _naming(path):

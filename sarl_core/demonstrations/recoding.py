@@ -17,7 +17,7 @@ from sarl_core.demonstrations.dataset import (
 from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.demonstrations.fields import TRUTH
 from sarl_core.demonstrations.words import Coded, columns_of_words, indicated, spelled, words_of
-from sarl_core.environments.feature_order import plain_names, shortened
+from sarl_core.environments.feature_order import compared_names, shortened
 from sarl_core.errors import InputError, quoted
 
 
@@ -48,7 +48,7 @@ def _deriving(demonstrations: Demonstrations, features: Sequence[Feature]) -> De
     """The same with other derived features than they have."""
     names = [one.name for one in demonstrations.observed]
     theirs = [one.name for one in observed_features(features)]
-    have, wanted = plain_names(names), plain_names(theirs)
+    have, wanted = compared_names(names, theirs)
     derived: tuple[DerivedFeature, ...] = ()
     if {*wanted} <= {*have}:
         places = [have.index(name) for name in wanted]
@@ -64,22 +64,31 @@ def _indicating(
     demonstrations: Demonstrations, features: Sequence[Feature], called: str
 ) -> Demonstrations:
     features = observed_features(features)
-    wanted = _by_column(features)
-    own = _by_column(demonstrations.observed)
-    indicators = [one.indicator for one in demonstrations.observed]
+    observed = demonstrations.observed
+    indicators = [one.indicator for one in observed]
+    by_column = [
+        columns_of_words(each) for each in ([one.indicator for one in features], indicators)
+    ]
+    *columns_each, read_from = compared_names(
+        *map(tuple, by_column),
+        [one.indicator.column if one.indicator else one.name for one in observed],
+    )
+    wanted, own = (
+        dict(zip(names, places.values(), strict=True))
+        for names, places in zip(columns_each, by_column, strict=True)
+    )
     if not wanted or [one.indicator for one in features] == indicators:
         return demonstrations
     columns: list[np.ndarray[tuple[int], np.dtype[np.float32]]] = []
     said: list[Feature] = []
-    for at, feature in enumerate(demonstrations.observed):
-        (column,) = plain_names((feature.indicator.column if feature.indicator else feature.name,))
-        places = own.get(column, [at])
-        if column not in wanted or at != places[0]:
+    for at, (feature, column) in enumerate(zip(observed, read_from, strict=True)):
+        together = own.get(column, [at])
+        if column not in wanted or at != together[0]:
             if column not in wanted or feature.indicator is None:
                 columns.append(demonstrations.observations[:, at])
                 said.append(feature)
             continue
-        coded = _words(demonstrations, places)
+        coded = _words(demonstrations, together)
         known = [features[place] for place in wanted[column]]
         if coded is None:  # numbers, which are refused as another feature
             columns.append(demonstrations.observations[:, at])
@@ -96,12 +105,6 @@ def _indicating(
         feature_units=tuple(one.unit for one in said),
         indicators=tuple(one.indicator for one in said),
     )
-
-
-def _by_column(features: Sequence[Feature]) -> dict[str, list[int]]:
-    """Where the features of each column of words stand."""
-    places = columns_of_words([one.indicator for one in features])
-    return dict(zip(plain_names(tuple(places)), places.values(), strict=True))
 
 
 def _words(demonstrations: Demonstrations, places: Sequence[int]) -> Coded | None:

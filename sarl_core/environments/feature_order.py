@@ -7,6 +7,7 @@ each numbers its features in an order of its own, and only names tell which is w
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from typing import Literal, NamedTuple, TypeVar
 
@@ -64,10 +65,9 @@ class FeatureOrder(NamedTuple):
 def line_up(first: NamedFeatures, second: NamedFeatures, *, what: str = "features") -> FeatureOrder:
     """Say which feature of one thing is which of another; the one place that decides it.
 
-    Names are the same whatever their capitals, and whether words are parted by spaces, lines or
-    hyphens. Names that only count (``feature 0``, ``obs_1``) say nothing. Of one environment a
-    feature may have been renamed by a person: its place then says what it is, as long as no name
-    of the other stands elsewhere.
+    Names are the same where `compared_names` has it so. Names that only count (``feature 0``,
+    ``obs_1``) say nothing. Of one environment a feature may have been renamed by a person: its
+    place then says what it is, as long as no name of the other stands elsewhere.
 
     Args:
         first: One of them.
@@ -91,7 +91,7 @@ def line_up(first: NamedFeatures, second: NamedFeatures, *, what: str = "feature
             "environment"
         )
     as_they_are = tuple(range(len(first.names)))
-    one, other = plain_names(first.names), plain_names(second.names)
+    one, other = compared_names(first.names, second.names)
     known = first.env_id != "" and _bare(first.env_id) == _bare(second.env_id)
     nameless = [only_counts(side.names) for side in (first, second)]
     if one == other and (known or not all(nameless)):
@@ -209,3 +209,29 @@ def plain_names(names: Sequence[str]) -> list[str]:
         One each.
     """
     return [" ".join(re.split(r"[\s_\-]+", name.casefold().strip())) for name in names]
+
+
+def compared_names(*several: Sequence[str]) -> list[list[str]]:
+    """Names of things that meet, as they are compared with each other.
+
+    Args:
+        *several: The names of each thing.
+
+    Returns:
+        As many for each: plain ones (`plain_names`), but for those that one thing uses for two,
+        as x and X, which stay as they are written.
+    """
+    plain = [plain_names(names) for names in several]
+    doubled = {
+        name
+        for names, plainly in zip(several, plain, strict=True)
+        for name, count in Counter(dict(zip(names, plainly, strict=True)).values()).items()
+        if count > 1
+    }
+    return [
+        [
+            name if plain_name in doubled else plain_name
+            for name, plain_name in zip(names, plainly, strict=True)
+        ]
+        for names, plainly in zip(several, plain, strict=True)
+    ]

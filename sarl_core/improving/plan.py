@@ -12,6 +12,7 @@ from sarl_core.mining.combining.candidates import Pair
 from sarl_core.mining.rules import Thresholds
 from sarl_core.rollouts.choices import Choice
 from sarl_core.rollouts.seeds import (
+    LARGEST_RUN,
     MOST_EPISODES_A_ROUND,
     MOST_ROUNDS,
     MOST_VALIDATION,
@@ -90,7 +91,7 @@ class Plan:
             ("number of search episodes", self.search_episodes, 1, _MOST_SEARCH_EPISODES),
             ("number of validation episodes", self.validation, 1, MOST_VALIDATION),
             ("number of report episodes", self.report, 1, MOST_VALIDATION),
-            ("seed", self.seed, 0, None),
+            ("seed", self.seed, 0, LARGEST_RUN),
             ("limit of a search episode", _or_one(self.search_limit), 1, None),
             ("number of search starts", _or_one(self.search_starts), 1, self.rounds),
             ("max_steps", _or_one(self.max_steps), 1, None),

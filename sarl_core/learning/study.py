@@ -285,6 +285,16 @@ def _learned(plan: LearningPlan, seed: int, arm: LearningArm, **meanwhile: Any) 
     )
 
 
+_CALLED = {
+    "env_id": "environment",
+    "made_with": "way to make the environment",
+    "steps": "number of steps",
+    "trial_episodes": "number of episodes",
+    "trial_max_steps": "limit of an episode",
+    "rules": "rule set",
+}
+
+
 def _claim(folder: Path, plan: LearningPlan) -> None:
     """Write the plan down, or check that it is the one that was begun here.
 
@@ -299,9 +309,10 @@ def _claim(folder: Path, plan: LearningPlan) -> None:
             name for name in settings if name not in free and before.get(name) != settings[name]
         ]
         if other:
+            what = " and ".join(_CALLED.get(name, name) for name in other)
             raise InputError(
-                f"the folder {folder} holds a study with another {' and '.join(other)}; choose "
-                "another folder, or delete this one"
+                f"the folder {folder} holds a study with another {what}; choose another folder, or "
+                "delete this one"
             )
         if all(before.get(name) == settings[name] for name in free):
             return

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from sarl_core.agents.agent import Agent
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
-from sarl_core.errors import InputError, require_whole
+from sarl_core.errors import InputError
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.rule_tree import NO_RULE
 from sarl_core.progress import Progress, report
@@ -127,7 +127,6 @@ def fork(
         WorkError: If drawing fails.
         CancelledError: If `progress` returned False.
     """
-    require_whole("seed", seed, 0)
     if rest not in get_args(Rest):
         raise InputError(f"the rest {rest!r} is neither shielded nor alone; choose one")
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)

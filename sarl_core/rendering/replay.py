@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from sarl_core.agents.agent import Agent
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
-from sarl_core.errors import InputError, require_whole
+from sarl_core.errors import InputError
 from sarl_core.files import as_path, whole_file
 from sarl_core.mining.environment_actions import environment_dimensions
 from sarl_core.mining.labels import LabelledDimension
@@ -262,7 +262,6 @@ def _replay(
     max_steps: int | None,
     progress: Progress | None,
 ) -> Replay:
-    require_whole("seed", seed, 0)
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     fps, limit = picture_speed(env_id, max_steps)
     # Whose words are used for the panel without rules, too.

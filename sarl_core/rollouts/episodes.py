@@ -484,7 +484,6 @@ def rollout(
     most = MAX_STEPS if max_steps is None else max_steps
     for name, value, least in (
         ("episodes", episodes, 1),
-        ("seed", seed, 0),
         ("batch", batch, 1),
         ("jobs", jobs, 1),
         ("max_steps", most, 1),

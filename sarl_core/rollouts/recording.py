@@ -74,7 +74,6 @@ def record(
         CancelledError: If `progress` returned False.
     """
     require_whole("steps", steps, 1)
-    require_whole("seed", seed, 0)
     actor = make_agent(agent, env_id, stochastic=stochastic, seed=seed)
     outcomes: list[EpisodeArrays] = []
     episodes = done = 0

@@ -53,6 +53,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from sarl_core.errors import require_whole
+
 DEMONSTRATED = 0
 LEARNERS = 0
 FRESH = 100_000  # far from those the demonstrations were recorded with
@@ -71,6 +73,11 @@ ROUNDS = 20_000_000
 VALIDATION = 30_000_000
 REFINEMENT = 40_000_000
 REPORT = 50_000_000
+
+LARGEST_SEED = 2**53
+"""Of a first episode: whole numbers up to here are exact in every file."""
+LARGEST_RUN = 10**9
+"""Of `aggregate` and `probe`, whose episodes begin so much further on."""
 
 SEEDS_A_RUN = 1_000_000  # between two values of the seed of `aggregate`
 SEEDS_A_ROUND = 10_000
@@ -128,6 +135,19 @@ class RunSeeds(NamedTuple):
     validation: int | None = None
     refinement: int | None = None
     report: int | None = None
+
+
+def require_seed(seed: int, most: int = LARGEST_SEED) -> None:
+    """Refuse what is no seed.
+
+    Args:
+        seed: As it was given.
+        most: The largest.
+
+    Raises:
+        InputError: If it is no whole number from 0 to that.
+    """
+    require_whole("seed", seed, 0, most)
 
 
 def of_run(first: int, seed: int) -> int:

@@ -15,6 +15,7 @@ from sarl_core.agents.sb3_normalisation import AS_THEY_ARE, TrainingEnd
 from sarl_core.environments.description import describe_environment
 from sarl_core.environments.environment import EnvironmentOrId
 from sarl_core.rollouts.player import EpisodeFaultError, View, play
+from sarl_core.rollouts.seeds import require_seed
 
 _EPISODES, _STEPS = 4, 50  # of a trial
 
@@ -42,7 +43,8 @@ def make_agent(
             of a Stable-Baselines3 `.zip` with an `MlpPolicy`; an agent is given back as it is.
         env_id: What ``gymnasium.make`` takes.
         stochastic: Whether a trained policy is sampled.
-        seed: Of the untrained weights; the same seed gives the same weights.
+        seed: Of the untrained weights, and of what the agent is to play; the same seed gives the
+            same weights.
         normalise: Of a `.zip` that was trained under `VecNormalize`: the `.pkl` with its
             statistics, or ``none`` where its observations were not normalised. Found beside
             the `.zip` where not given and the name leaves no doubt.
@@ -51,9 +53,10 @@ def make_agent(
         The agent.
 
     Raises:
-        InputError: If there is no such agent, or it does not fit the environment.
+        InputError: If the seed is none, there is no such agent, or it does not fit the environment.
         WorkError: If a package that it needs is not installed.
     """
+    require_seed(seed)
     agent = untried_agent(spec, env_id, stochastic=stochastic, seed=seed, normalise=normalise)
     if agent is spec or not isinstance(agent, PolicyAgent):
         return agent

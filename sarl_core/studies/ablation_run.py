@@ -318,7 +318,6 @@ def ablate(
     """
     for name, value, least in (
         ("episodes", episodes, LEAST_EPISODES),
-        ("seed", seed, 0),
         ("most", most, 1),
         ("jobs", jobs, 1),
         ("max_steps", MAX_STEPS if max_steps is None else max_steps, 1),

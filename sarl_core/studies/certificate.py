@@ -26,7 +26,7 @@ from sarl_core.environments.failures import failure_text, no_failures_text
 from sarl_core.errors import InputError, SarlError, require_whole
 from sarl_core.mining.rule_set import rules_digest
 from sarl_core.processes import executor_of
-from sarl_core.rollouts.episodes import MAX_STEPS, Episodes
+from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, join
 from sarl_core.rollouts.player import check_environment
 from sarl_core.rollouts.seeds import CERTIFIED
 from sarl_core.rollouts.statistics import Rate, rate_of
@@ -285,7 +285,6 @@ def certify(
         InputError: If a number is out of range, it is not known what a failure is, or agent,
             shield and environment do not fit.
     """
-    require_whole("seed", seed, 0)
     require_whole("jobs", jobs, 1)
     require_whole("max_steps", MAX_STEPS if max_steps is None else max_steps, 1)
     test = sequential_test(at_most, certainty, episodes)
@@ -293,12 +292,14 @@ def certify(
     subject = subject_of(env_id, actor, shield, max_steps)
     _, fitted, notes = check_environment(env_id, shield)
     task = Task(env_id, actor, fitted, seed, test.episodes, max_steps=max_steps)
-    verdict, remarks = Verdict(None, 0, 0, 0), dict.fromkeys(notes)
+    verdict, pieces = Verdict(None, 0, 0, 0), []
     for step in run_test(test, task, executor=executor_of(jobs, executor)):
         verdict = step.verdict
-        remarks |= dict.fromkeys(step.fresh.remarks)
+        pieces.append(step.fresh)
         if progress is not None:
             progress(step)
+    # Of all together: how many were cut off is one number.
+    remarks = dict.fromkeys([*notes, *join(pieces).remarks])
     return certificate_of(subject, test, verdict, seed, command=command, notes=tuple(remarks))
 
 

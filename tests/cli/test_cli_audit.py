@@ -241,3 +241,15 @@ def test_what_a_cluster_cannot_do_is_one_sentence(
     assert out == ""
     assert error.count("\n") == 1
     assert said in error
+
+
+def test_what_does_not_fit_in_the_demonstrations_is_no_fault_of_the_log(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    other = tmp_path / "other.csv"
+    other.write_text("episode,obs_gap,action\n" + "0,0.5,0\n" * 20)
+    assert main(["audit", RULES, LOG, "--demonstrations", str(other)]) == 2
+    said = capsys.readouterr().err
+    assert f"{other}: " in said
+    assert LOG not in said
+    assert "the demonstrations have" in said

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sarl_core.environments.feature_order import NamedFeatures as Named
-from sarl_core.environments.feature_order import line_up, numbered, only_counts
+from sarl_core.environments.feature_order import compared_names, line_up, numbered, only_counts
 from sarl_core.errors import InputError
 
 CART = ("cart position", "cart velocity", "pole angle", "pole angular velocity")
@@ -32,6 +32,16 @@ def test_capitals_and_what_parts_words_do_not_matter():
     order = line_up(Named("the rules", spelled), ENV)
     assert order.how == "permuted"
     assert order.put(spelled) == (spelled[2], spelled[3], spelled[0], spelled[1])
+
+
+def test_names_that_read_alike_are_told_apart_as_they_stand():
+    ours, theirs = compared_names(("x", "X", "Lane_Width"), ("X", "lane width"))
+    assert (ours, theirs) == (["x", "X", "lane width"], ["X", "lane width"])
+    three, turned = ("x", "X", "v"), ("X", "v", "x")
+    order = line_up(Named("the log", turned), Named("the rules", three))
+    assert (order.how, order.put(turned)) == ("permuted", three)
+    with pytest.raises(InputError, match="different features"):
+        line_up(Named("the log", ("x", "X", "v")), Named("the rules", ("x", "v", "w")))
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,12 @@ def test_more_arms_and_seeds_may_be_asked_for_later(plan: LearningPlan, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("change", "said"), [({"steps": 401}, "steps"), ({"rules": None}, "rules")]
+    ("change", "said"),
+    [
+        ({"steps": 401}, "number of steps"),
+        ({"rules": None}, "rule set"),
+        ({"episodes": 99}, "number of episodes"),
+    ],
 )
 def test_a_folder_of_another_study_is_refused(
     plan: LearningPlan, done: Path, change: dict[str, object], said: str

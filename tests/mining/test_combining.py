@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sarl_core import Demonstrations, InputError, RuleSet, Shield, grow_policy_trees, mine_rules
+from sarl_core.auditing.audit import audit
 from sarl_core.demonstrations.dataset import formula_feature
 from sarl_core.demonstrations.derived import Combination, DerivedFeature, extend
 from sarl_core.demonstrations.recoding import recoded
@@ -330,3 +331,28 @@ def test_a_fold_has_no_say_in_what_is_combined_for_it() -> None:
         assert fold.trees[0].source.features == own.features
     assert pairs_chosen_from(combined, divider=2) == pairs
     assert pairs_chosen_from(plain, divider=2) == ()
+
+
+def test_features_whose_names_differ_in_capitals_alone_are_two_features() -> None:
+    plain = demonstrations()
+    alike = replace(plain, feature_names=("x", "v", "contact", "X"))
+    apart = replace(plain, feature_names=("x", "v", "contact", "w"))
+    for names, others in (("X,v", "w,v"), ("x,v", "x,v"), ("x,X", "x,w")):
+        assert pairs_by_name(alike, [names]) == pairs_by_name(apart, [others])
+    mined = with_combinations(alike)
+    assert [one.definition.terms for one in mined.derived] == [
+        one.definition.terms for one in with_combinations(apart).derived
+    ]
+    rules = mine_rules(mined, supp_min=0.01, conf_min=0.95)
+    # As a log that was read in another order, with a column more.
+    order = [3, 1, 0, 2]
+    log = replace(
+        plain,
+        observations=np.hstack([plain.observations[:, order], plain.observations[:, :1]]),
+        feature_names=("X", "v", "x", "contact", "further"),
+        feature_units=("", "m/s", "m", "", ""),
+    )
+    assert audit(rules, log).broken == audit(rules, alike).broken
+    seen = recoded(log, rules.source.features, called="the log")
+    assert [one.name for one in seen.features[5:]] == [one.name for one in mined.features[4:]]
+    assert (seen.observations[:, 5:] == mined.observations[:, 4:]).all()

@@ -291,6 +291,10 @@ BAD = {
         lambda d: d["features"][0].update(name="\ud800"),
         "holds half of a surrogate pair",
     ),
+    "a word that is none": (
+        lambda d: d["features"][0].update(indicator={"column": "mode", "value": ""}),
+        "'value' is '', of the wrong kind in features 1 indicator",
+    ),
     "a label that is a number": (
         lambda d: d["actions"][0].update(labels=["a", 2]),
         "labels 2 is 2, of the wrong kind in actions 1;",

@@ -6,6 +6,11 @@ import re
 from itertools import combinations
 from pathlib import Path
 
+import pytest
+
+from sarl_core import InputError, rollout
+from sarl_core.improving.plan import Plan
+from sarl_core.improving.probing.probing import ProbePlan
 from sarl_core.rollouts import seeds
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -49,3 +54,16 @@ def test_no_other_file_of_the_library_has_seeds_of_its_own():
         if pattern.search(path.read_text(encoding="utf-8"))
     }
     assert found == set()
+
+
+@pytest.mark.parametrize("agent", ["novice", "untrained"])
+def test_a_seed_that_no_file_could_hold_is_refused(agent: str) -> None:
+    env_id = "CartPole-v1"
+    assert len(rollout(env_id, agent, episodes=2, seed=seeds.LARGEST_SEED, max_steps=3)) == 2
+    for seed, said in ((seeds.LARGEST_SEED + 1, "at most"), (10**20, "at most"), (-1, "at least")):
+        with pytest.raises(InputError, match=f"seed is {seed} and must be {said}"):
+            rollout(env_id, agent, episodes=2, seed=seed, max_steps=3)
+    with pytest.raises(InputError, match="1,000,000,000 or fewer"):
+        Plan(2, seed=seeds.LARGEST_RUN + 1)
+    with pytest.raises(InputError, match="must be at most 1000000000"):
+        ProbePlan(seed=seeds.LARGEST_RUN + 1)

@@ -163,3 +163,11 @@ def test_what_is_no_file_of_a_certificate_is_refused(tmp_path):
 def test_the_rate_is_that_of_its_episodes(certified):
     assert (certified.rate.count, certified.rate.of) == (0, certified.verdict.episodes)
     assert np.isclose(certified.rate.at_most, 1 - 0.05 ** (1 / certified.verdict.episodes))
+
+
+def test_how_many_episodes_were_cut_off_is_one_number(shield):
+    cut = certify(CART, "novice", shield, at_most=0.5, episodes=20, max_steps=5)
+    assert cut.verdict.episodes == 20
+    said = [note for note in cut.notes if "cut off" in note]
+    assert len(said) == 1
+    assert said[0].startswith("all 20 episodes were cut off after 5 steps")

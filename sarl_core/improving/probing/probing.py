@@ -87,10 +87,10 @@ class ProbePlan:
             ("divider", self.divider, 2),
             ("number of validation episodes", self.validation, 1),
             ("number of report episodes", self.report, 1),
-            ("seed", self.seed, 0),
             ("max_steps", 1 if self.max_steps is None else self.max_steps, 1),
         ):
             require_whole(name, value, least)
+        seeds.require_seed(self.seed, seeds.LARGEST_RUN)
         require(self.risk, Real, "the risk must be a number", "give a share, as 0.2")
         if not 0.0 < self.risk < 1.0:
             raise InputError(f"the risk is {self.risk}; give a share above 0 and below 1, as 0.2")

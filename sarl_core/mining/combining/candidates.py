@@ -9,7 +9,7 @@ import numpy as np
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import LARGEST_RATIO, Combination
-from sarl_core.environments.feature_order import plain_names, shortened
+from sarl_core.environments.feature_order import compared_names, shortened
 from sarl_core.errors import InputError, quoted
 
 RATIOS = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)
@@ -82,7 +82,7 @@ def amount_named(demonstrations: Demonstrations, name: str) -> int:
 
     Args:
         demonstrations: N states.
-        name: Whatever its capitals, with spaces or underscores.
+        name: Whatever its capitals, with spaces or underscores, where no other one reads the same.
 
     Returns:
         Of a feature that is a number.
@@ -91,13 +91,13 @@ def amount_named(demonstrations: Demonstrations, name: str) -> int:
         InputError: If there is none of that name, or it says which word a column holds.
     """
     names = [feature.name for feature in demonstrations.observed]
-    plain, (wanted,) = plain_names(names), plain_names((name,))
-    if wanted not in plain:
+    known, (wanted,) = compared_names(names, (name.strip(),))
+    if wanted not in known:
         raise InputError(
             f"{quoted(name.strip())} is no feature that could be combined; the features are "
             f"{shortened(names)}"
         )
-    place = plain.index(wanted)
+    place = known.index(wanted)
     if demonstrations.observed[place].indicator is not None:
         raise InputError(
             f"{quoted(names[place])} says which word a column holds and is no amount; combine "

@@ -15,7 +15,7 @@ from sarl_core.demonstrations.dataset import (
     with_derived,
 )
 from sarl_core.demonstrations.derived import DerivedFeature
-from sarl_core.environments.feature_order import plain_names
+from sarl_core.environments.feature_order import compared_names
 from sarl_core.mining.evidence import DataBox
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule
@@ -34,7 +34,7 @@ def deriving_alike(first: RuleSet, second: RuleSet) -> tuple[RuleSet, RuleSet]:
         The same rules; the same objects where both derive the same, or are of other features.
     """
     observed = [observed_features(each.source.features) for each in (first, second)]
-    own, other = (plain_names([one.name for one in each]) for each in observed)
+    own, other = compared_names(*([one.name for one in each] for each in observed))
     if len(own) != len(other):
         return first, second
     places = list(range(len(own)))  # of the second's features among the first's

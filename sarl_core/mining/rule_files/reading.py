@@ -88,8 +88,8 @@ class DocumentPart(Struct, forbid_unknown_fields=True):
 
 
 class _Indicator(DocumentPart):
-    column: str
-    value: str
+    column: Annotated[str, Meta(min_length=1)]
+    value: Annotated[str, Meta(min_length=1)]
     otherwise: str = ""
 
 
