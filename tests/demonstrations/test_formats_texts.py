@@ -235,6 +235,16 @@ BAD: dict[str, tuple[str, Callable[[], bytes], str]] = {
         ),
         "row 17001 has two values for the column 'obs.x'",
     ),
+    "a name twice beside a colon that is written as a number": (
+        "demo.jsonl",
+        lambda: b'{"obs_x": 1, "obs_x": 2, "time": "12\\u003A00", "action": 0}\n',
+        "row 1 has two values for the column 'obs_x'",
+    ),
+    "a name twice beside a number without end": (
+        "demo.jsonl",
+        lambda: b'{"obs": {"x": 1, "x": 2}, "id": 1%s, "action": 0}\n' % (b"0" * 99),
+        "row 1 has two values for the column 'obs.x'",
+    ),
     "a name twice beside NaN": (
         "demo.jsonl",
         lambda: lines([{"obs_x": 1, "action": 0}]) + b'{"obs_x": 1, "obs_x": NaN, "action": 0}\n',

@@ -21,7 +21,8 @@ _DEEPEST = 6  # objects within one another
 _NUMBER = 8  # bytes
 
 _DECODER = msgspec.json.Decoder()
-_BLANKS = b" \t\r"
+_ENCODER = msgspec.json.Encoder()
+_PERHAPS_COLON = b"\\u003"  # one that would be written as such
 _UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
 
 
@@ -123,34 +124,28 @@ def _decoded(lines: Sequence[bytes], first: int) -> list[Any]:
         rows = list(_DECODER.decode_lines(text))
     except _UNREADABLE:
         rows = [_row(line, number) for number, line in enumerate(lines, first)]
-    # Of two values with one name, the decoder gives the last. A colon follows each name, so that
-    # there are more of them then. Most files have no others, and those are soon counted.
+    # Of two values with one name, the decoder gives the last. Each name has a colon behind it; most
+    # files have no other, and need not be written again to count them.
     names = sum(len(row) for row in rows if isinstance(row, dict))
-    if names == text.count(b":") or (colons := _colons(text)) == names or colons == _names(rows):
+    if names == text.count(b":") or _has_all_names(rows, text):
         return rows
     return [
-        row if _colons(line) == _names(row) else _parsed(line, number)
+        row if _has_all_names(row, line) else _parsed(line, number)
         for number, (line, row) in enumerate(zip(lines, rows, strict=True), first)
     ]
 
 
-def _colons(text: bytes) -> int:
-    """How many colons follow a quotation mark: one for each name, and few within texts."""
-    # Between the two may be blanks.
-    return text.translate(None, _BLANKS).count(b'":')
+def _has_all_names(value: Any, text: bytes) -> bool:
+    """Whether what was read from a text has all names in it; False also where that is unclear.
 
-
-def _names(value: Any) -> int:
-    """How many names stand in all of the objects within a value, however deep."""
-    count, left = 0, [value]
-    while left:
-        one = left.pop()
-        if isinstance(one, dict):
-            count += len(one)
-            left += one.values()
-        elif isinstance(one, list):
-            left += one
-    return count
+    Written again, it has as many colons then, those within texts among them.
+    """
+    if _PERHAPS_COLON in text:
+        return False
+    try:
+        return _ENCODER.encode(value).count(b":") == text.count(b":")
+    except (ValueError, OverflowError, RecursionError):  # of what only the slower reader takes
+        return False
 
 
 def _row(line: bytes, number: int) -> Any:
