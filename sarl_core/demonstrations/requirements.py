@@ -97,6 +97,33 @@ def require_labels(
         )
 
 
+def require_whole(
+    values: NDArray[Any], columns: Sequence[str], rows: NDArray[np.int64] | None = None
+) -> None:
+    """Refuse labels that are no whole numbers, or too large to be made such of 64 bits.
+
+    Args:
+        values: Finite, shape (N, m).
+        columns: What the m columns are called in the message.
+        rows: Shape (N,), the rows they had in the file, from 0; None if they are those.
+
+    Raises:
+        InputError: With the column and the first row.
+    """
+    if values.dtype.kind not in "fu":
+        return
+    # Beyond 2**53 a float64 cannot say which whole number is meant.
+    most = EXACT if values.dtype.kind == "f" else 2**63 - 1
+    for wrong, what in (
+        (~without_fraction(values), "but its actions are labels; write whole numbers"),
+        (np.abs(values) > most, "which is too large for a label; mend that row"),
+    ):
+        if wrong.any():
+            row, i = _first(wrong)
+            where = f"row {_number(row, rows)}"
+            raise InputError(f"{columns[i]} is {values[row, i]} in {where}, {what}")
+
+
 def require_codes(
     values: NDArray[np.int64], columns: Sequence[str], rows: NDArray[np.int64] | None = None
 ) -> None:

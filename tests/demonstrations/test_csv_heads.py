@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from sarl_core.demonstrations.dataset import Demonstrations
-from sarl_core.demonstrations.formats import preview_columns, read_demonstrations
+from sarl_core.demonstrations.formats import preview_columns, read_demonstrations, table_columns
 from sarl_core.errors import InputError
 
 ROWS = ["0.5,8,0,0", "0.25,7,1,0", "0.1,7,1,1", "0.7,6,0,1"]
@@ -193,3 +193,84 @@ def test_a_delimiter_at_the_end_makes_no_column(header: str, row: str) -> None:
 def test_an_unnamed_first_column_numbers_the_rows() -> None:
     numbered = read(f",{NAMES}", *(f"{index},{one}" for index, one in enumerate(ROWS)))
     assert numbered.columns[0].why == "it numbers the rows"
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("sign", [",", ";", "\t", "|"])
+@pytest.mark.parametrize("above", ["", "# rig 4\n", '"Crane 4\nMarch 2026"\n\n'])
+def test_a_name_may_break_between_its_quotation_marks(newline: str, sign: str, above: str) -> None:
+    names = ['"speed\n(m/s)"', '"gap, ""front""\n\n[m]\n"', '"action\n(0/1)"', '"episode\nno"']
+    rows = [row.replace(",", sign) for row in ROWS]
+
+    def file(rows: list[str]) -> bytes:
+        return (above + "\n".join([sign.join(names), *rows])).replace("\n", newline).encode()
+
+    broken = read_demonstrations(file(rows), "rig.csv")
+    plain = read(NAMES, *ROWS)
+    columns = ("speed (m/s)", 'gap, "front" [m]', "action (0/1)", "episode no")
+    assert table_columns(file(rows), "rig.csv") == columns
+    assert broken.observations.tolist() == plain.observations.tolist()
+    assert broken.actions.tolist() == plain.actions.tolist()
+    assert broken.episodes.tolist() == plain.episodes.tolist()
+    assert any("above" in note for note in broken.notes) == above.startswith('"')
+    line = len((above + sign.join(names)).split("\n")) + 2
+    with pytest.raises(InputError, match=rf"row 2 \(line {line}\) has 3 fields"):
+        read_demonstrations(file([rows[0], rows[1][:-2], *rows[2:]]), "rig.csv")
+
+
+@pytest.mark.parametrize(
+    ("names", "columns"),
+    [
+        ('size 5",gap 6",action,episode', ('size 5"', 'gap 6"', "action", "episode")),
+        ('"speed",gap,action,"episode', ("speed", "gap", "action", "episode")),
+    ],
+)
+def test_quotation_marks_around_no_field_hold_no_line_break(
+    names: str, columns: tuple[str, ...]
+) -> None:
+    rows = [f'{row[:-1]}"{row[-1]}"' for row in ROWS]
+    content = "\n".join([names, *rows]).encode()
+    assert table_columns(content, "rig.csv") == columns
+    assert len(read_demonstrations(content, "rig.csv")) == len(ROWS)
+
+
+@pytest.mark.parametrize(
+    ("sign", "names"),
+    [
+        (",", ("|v|", "x", "action")),
+        (",", ("gap; front", "x", "action")),
+        (",", ("gap\tfront", "x;y|z", "action")),
+        ("\t", ("gap; front", "x, y", "action")),
+        ("|", ("gap; front", "x\ty", "action")),
+        (";", ("gap | front", "x, y", "action")),
+    ],
+)
+@pytest.mark.parametrize("count", [2, 30])
+@pytest.mark.parametrize("above", [(), ("# a; b; c|d",), ('"Crane 4; March, 2026"',)])
+def test_a_sign_in_a_name_separates_no_fields(
+    sign: str, names: tuple[str, ...], count: int, above: tuple[str, ...]
+) -> None:
+    rows = [f"{row % 7 / 4}{sign}{row % 5}{sign}{row % 2}" for row in range(count)]
+    plain = read_demonstrations(
+        "\n".join(["v,x,action", *rows]).replace(sign, ",").encode(), "rig.csv"
+    )
+    for end in ("", sign):
+        content = "\n".join([*above, sign.join(names) + end, *rows]).encode()
+        assert table_columns(content, "rig.csv")[:3] == names
+        named = read_demonstrations(content, "rig.csv")
+        assert named.observations.tolist() == plain.observations.tolist()
+
+
+def test_decimal_commas_separate_no_fields() -> None:
+    rows = [f"{row},5;{row % 3},25;{row % 2}" for row in (3, 1, 4, 1, 5)]
+    for names in ("speed;gap;action", "speed, own, m;gap;action"):
+        for damaged in ([], ["1,5;2,5"]):
+            content = "\n".join([names, *rows, *damaged]).encode()
+            assert table_columns(content, "rig.csv") == tuple(names.split(";"))
+        read_so = read(names, *rows)
+        assert read_so.observations[0].tolist() == [3.5, 0.25]
+    assert table_columns("\n".join(rows).encode(), "rig.csv") == (
+        "column 1",
+        "column 2",
+        "column 3",
+    )

@@ -112,6 +112,19 @@ def test_non_integer_discrete_action(action: object, kind: str) -> None:
     assert "whole numbers" in sentence(error)
 
 
+@pytest.mark.parametrize("kind", ["csv", "parquet", "npz"])
+def test_an_action_too_large_for_a_label_is_not_said_to_be_no_whole_number(kind: str) -> None:
+    large = 2**63
+    content = {
+        "csv": csv_bytes("1,0", f"2,{large}", header="obs_x,action"),
+        "parquet": parquet_bytes({"obs_x": [1, 2], "action": np.array([0, large], np.uint64)}),
+        "npz": npz_bytes(obs=np.ones((2, 1)), acts=np.array([0.0, large])),
+    }[kind]
+    with pytest.raises(InputError) as error:
+        read_demonstrations(content, f"demo.{kind}")
+    assert "in row 2, which is too large for a label; mend that row" in sentence(error)
+
+
 def test_discrete_action_outside_the_action_space() -> None:
     content = csv_bytes("0,0,0,0,1", "0,0,0,1,2", header="obs_0,obs_1,obs_2,obs_3,action")
     with pytest.raises(InputError) as error:

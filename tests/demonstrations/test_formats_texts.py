@@ -222,6 +222,44 @@ BAD: dict[str, tuple[str, Callable[[], bytes], str]] = {
         lambda: lines([{"obs": {"x": 1}, "obs.x": 2, "action": 0}] * 2),
         "two values for the column 'obs.x'",
     ),
+    "a name twice": (
+        "demo.jsonl",
+        lambda: lines(ROWS) + b'{"episode": 3, "obs_x": 1, "obs_x": 2, "action": 0}\n',
+        "row 31 has two values for the column 'obs_x'; give each column its own name",
+    ),
+    "a name twice, far down and beside texts with colons": (
+        "demo.jsonl",
+        lambda: (
+            lines([{"time": "12:00", "obs": {"x": 1}, "action": 0}] * 17_000)
+            + b'{"time": ":\\":", "obs": {"x" : 1, "\\u0078"\t: 2}, "action": 0}\n'
+        ),
+        "row 17001 has two values for the column 'obs.x'",
+    ),
+    "a name twice beside a colon that is written as a number": (
+        "demo.jsonl",
+        lambda: b'{"obs_x": 1, "obs_x": 2, "time": "12\\u003A00", "action": 0}\n',
+        "row 1 has two values for the column 'obs_x'",
+    ),
+    "a name twice beside a number without end": (
+        "demo.jsonl",
+        lambda: b'{"obs": {"x": 1, "x": 2}, "id": 1%s, "action": 0}\n' % (b"0" * 99),
+        "row 1 has two values for the column 'obs.x'",
+    ),
+    "a name twice beside NaN": (
+        "demo.jsonl",
+        lambda: lines([{"obs_x": 1, "action": 0}]) + b'{"obs_x": 1, "obs_x": NaN, "action": 0}\n',
+        "row 2 has two values for the column 'obs_x'",
+    ),
+    "a name twice in a JSON list": (
+        "demo.json",
+        lambda: b'[{"car": {"x": 1}, "action": 0}, {"car": {"x": 1, "x": 2}, "action": 1}]',
+        "row 2 has two values for the column 'car.x'",
+    ),
+    "a name twice in JSON by columns": (
+        "demo.json",
+        lambda: b'{"obs_x": [1, 2], "obs_x": [3, 4], "action": [0, 1]}',
+        "the column 'obs_x' stands twice; give each column its own name",
+    ),
     "nested without end": (
         "demo.jsonl",
         lambda: b'{"obs": ' + b'{"a": ' * 900 + b"1" + b"}" * 901 + b"\n",
@@ -275,6 +313,13 @@ def test_what_is_wrong_is_one_sentence(name: str, monkeypatch: pytest.MonkeyPatc
         read_demonstrations(content(), file_name)
     assert str(error.value).startswith(f"{file_name}: ")
     assert "\n" not in str(error.value)
+
+
+def test_colons_in_texts_are_no_names() -> None:
+    texts = ["12:00", '":', ":", 'a "b" : c', "b"]
+    rows = [{**row, "obs_note": texts[i % 5], "log": [{"a": ":"}]} for i, row in enumerate(ROWS)]
+    read = read_demonstrations(lines(rows), "demo.jsonl")
+    assert read.digest == read_demonstrations(json.dumps(rows).encode(), "demo.json").digest
 
 
 def with_ids(base: int) -> list[dict[str, Any]]:
@@ -370,6 +415,11 @@ def test_sheets_of_which_any_may_be_meant_are_named() -> None:
     content = workbook_of({"Info": FACTS, "March": SHEET, "April": SHEET})
     with pytest.raises(InputError, match=r"in 2 sheets, 'March', 'April', any of which"):
         read_demonstrations(content, "demo.xlsx")
+
+
+def test_names_of_excel_may_have_several_lines() -> None:
+    content = workbook(("wind\n(m/s)", "episode\nno", "decided"), (1.5, 0, "a"), (2.5, 1, "b"))
+    assert table_columns(content, "demo.xlsx") == ("wind (m/s)", "episode no", "decided")
 
 
 def test_cells_of_excel_are_what_they_show() -> None:

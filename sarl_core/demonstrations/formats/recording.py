@@ -34,6 +34,7 @@ from sarl_core.demonstrations.requirements import (
     require_labels,
     require_length,
     require_order,
+    require_whole,
     require_within,
     whole_numbers,
     whole_numbers_note,
@@ -515,23 +516,8 @@ def _labels(
     if described is not None and not names:
         names, first, codes = described.label_names, described.label_first, ()
     columns = actions.reshape(len(actions), -1)
-    if columns.dtype.kind == "f":
-        require_finite(columns, recording.action_columns, recording.rows)
-        # Beyond 2**53 a float64 cannot say which whole number is meant.
-        wrong = ~without_fraction(columns) | (np.abs(columns) > EXACT)
-        if wrong.any():
-            row, i = (int(index[0]) for index in np.nonzero(wrong))
-            number = row if recording.rows is None else int(recording.rows[row])
-            raise InputError(
-                f"{recording.action_columns[i]} is {columns[row, i]} in row {number + 1}, but its "
-                "actions are labels; write whole numbers"
-            )
-    elif columns.dtype.kind == "u" and columns.size and int(columns.max()) > 2**63 - 1:
-        row, i = (int(index[0]) for index in np.nonzero(columns > 2**63 - 1))
-        raise InputError(
-            f"{recording.action_columns[i]} is {columns[row, i]} in row {row + 1}, which is too "
-            "large for a label; mend that row"
-        )
+    require_finite(columns, recording.action_columns, recording.rows)
+    require_whole(columns, recording.action_columns, recording.rows)
     whole = columns.astype(np.int64)
     m = whole.shape[1]
     if names:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +18,10 @@ _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)(e[+-]?\d+)?|[+-]?(nan|inf|in
 _FRACTION = re.compile(r"[+-]?\d*[.,]\d*(e[+-]?\d+)?|[+-]?\d+e[+-]?\d+|[+-]?(nan|inf)", re.I)
 _STATED = re.compile(r'"?sep=(.)"?', re.I)  # as Excel writes it
 _COMMENT = re.compile(r'\s*"?(#|%|//)')
+# Quotation marks around a field, between which a line may break; others, as of inches, are text.
+_FIELD = rb'(?: *+"(?:[^"]++|"")*+" *+(?=[;\t|,\r\n]|\Z)|[^\r\n;\t|,]*+)'
+_LINE = re.compile(rb"(" + _FIELD + rb"(?:[;\t|,]" + _FIELD + rb")*+)(\r\n|\r|\n|\Z)")
+_BREAK = re.compile(r"\r\n|\r|\n")
 _MAX_LINE = 2**24  # characters of a header
 _LONGEST_UNIT = 24
 _AROUND = '",;| \t'  # a title, where a spreadsheet has filled its line
@@ -102,7 +107,7 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
     above = _title_lines([one.text for one in ahead], delimiter)
     title = ahead[0].text.strip(_AROUND) if above else ""
     line, lines = ahead[above], chain(ahead[above + 1 :], lines)
-    delimiter = delimiter or _delimiter(line.text)
+    delimiter = delimiter or _delimiter([one.text for one in ahead[above:]])
     first = _fields(line.text, delimiter)
     names = _fields(comment, delimiter)
     if names and len(names) == len(first) and any(map(is_number, first)):
@@ -130,17 +135,16 @@ def read_head(data: memoryview, delimiter: Delimiter | None = None) -> CsvHead:
 
 
 def _lines(data: memoryview) -> Iterator[_HeadLine]:
-    """The lines in which something stands."""
-    pattern = re.compile(rb"([^\r\n]*)(\r\n|\r|\n|$)")
+    """The lines in which something stands, each with what is quoted in it to its end."""
     start, number = 0, 1
     while start < len(data):
-        match = pattern.match(data, start, start + _MAX_LINE)
+        match = _LINE.match(data, start, start + _MAX_LINE)
         if match is None or match.end() - start >= _MAX_LINE:
             raise InputError("its first line is too long; give a CSV file with one row a step")
         text = bytes(match[1]).decode()
         if text.strip():
             yield _HeadLine(text, start, number)
-        start, number = match.end(), number + 1
+        start, number = match.end(), number + 1 + len(_BREAK.findall(text))
 
 
 def _title_lines(texts: Sequence[str], delimiter: Delimiter | None) -> int:
@@ -148,7 +152,7 @@ def _title_lines(texts: Sequence[str], delimiter: Delimiter | None) -> int:
 
     They fill at most half as many fields as the header and the last of the lines do.
     """
-    sign = delimiter or _delimiter(texts[-1])
+    sign = delimiter or _delimiter(texts[-1:])
     rows = [[field for field in _fields(text, sign) if field.strip()] for text in texts]
     wide = len(rows[-1])
     header = next((place for place, row in enumerate(rows) if 2 * len(row) > wide), 0)
@@ -158,18 +162,28 @@ def _title_lines(texts: Sequence[str], delimiter: Delimiter | None) -> int:
     return header if names else 0
 
 
-def _delimiter(line: str) -> Delimiter:
-    unquoted = re.sub(r'"(?:[^"]|"")*"', "", line)
-    return next((sign for sign in _DELIMITERS if sign in unquoted), ",")
+def _delimiter(texts: Sequence[str]) -> Delimiter:
+    """What separates the fields of the first line, by the number of fields in the others."""
+    unquoted = re.sub(r'"(?:[^"]|"")*"', "", texts[0])
+    signs = [sign for sign in _DELIMITERS if sign in unquoted] or [","]
+    for sign in signs:  # a name may hold one of them that separates nothing
+        names, *rows = (_fields(text, sign) for text in texts)
+        # In most rows: what is wrong with the others is said where they are read.
+        if 2 * sum(len(_as_wide(names, row)) == len(row) for row in rows) >= len(rows):
+            return sign
+    return signs[0]
 
 
 def _fields(line: str, delimiter: str) -> list[str]:
+    """The fields of a line; a line break in one of them, as between two words, is a space."""
+    text = io.StringIO(line, newline="")
     try:
-        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+        fields = next(csv.reader(text, delimiter=delimiter, skipinitialspace=True), [])
     except csv.Error as error:
         raise InputError("its first line cannot be read as CSV; check its quotation marks") from (
             error
         )
+    return [" ".join(field.split()) if _BREAK.search(field) else field for field in fields]
 
 
 def is_number(field: str) -> bool:

@@ -21,7 +21,22 @@ _DEEPEST = 6  # objects within one another
 _NUMBER = 8  # bytes
 
 _DECODER = msgspec.json.Decoder()
+_ENCODER = msgspec.json.Encoder()
+_PERHAPS_COLON = b"\\u003"  # one that would be written as such
 _UNREADABLE = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)
+
+
+class _Doubled(dict[str, Any]):
+    """An object in which a name stands twice.
+
+    Attributes:
+        name: The first that does.
+    """
+
+    def __init__(self, pairs: Sequence[tuple[str, Any]]) -> None:
+        super().__init__(pairs)
+        names = [name for name, _ in pairs]
+        self.name = next(name for name in names if names.count(name) > 1)
 
 
 def open_json_lines(data: memoryview) -> ArrowTable:
@@ -52,7 +67,7 @@ def open_json(data: memoryview) -> ArrowTable:
         InputError: Likewise.
     """
     try:
-        document = parse_json(bytes(data), finite=False)
+        document = parse_json(bytes(data), finite=False, object_pairs_hook=_object)
     except InputError:
         raise
     except ValueError as error:
@@ -61,6 +76,10 @@ def open_json(data: memoryview) -> ArrowTable:
         except InputError:
             raise InputError(f"it is not JSON ({error}); save it again") from error
     if isinstance(document, dict) and document and all(_is_column(v) for v in document.values()):
+        if isinstance(document, _Doubled):
+            raise InputError(
+                f"the column {quoted(document.name)} stands twice; give each column its own name"
+            )
         lengths = {len(values) for values in document.values()}
         if len(lengths) > 1:
             raise InputError(
@@ -100,20 +119,53 @@ def _rows_of_lines(data: memoryview) -> Iterator[list[Any]]:
 
 
 def _decoded(lines: Sequence[bytes], first: int) -> list[Any]:
+    text = b"\n".join(lines)
     try:
-        return list(_DECODER.decode_lines(b"\n".join(lines)))
+        rows = list(_DECODER.decode_lines(text))
     except _UNREADABLE:
-        return [_row(line, number) for number, line in enumerate(lines, first)]
+        rows = [_row(line, number) for number, line in enumerate(lines, first)]
+    # Of two values with one name, the decoder gives the last. Each name has a colon behind it; most
+    # files have no other, and need not be written again to count them.
+    names = sum(len(row) for row in rows if isinstance(row, dict))
+    if names == text.count(b":") or _has_all_names(rows, text):
+        return rows
+    return [
+        row if _has_all_names(row, line) else _parsed(line, number)
+        for number, (line, row) in enumerate(zip(lines, rows, strict=True), first)
+    ]
+
+
+def _has_all_names(value: Any, text: bytes) -> bool:
+    """Whether what was read from a text has all names in it; False also where that is unclear.
+
+    Written again, it has as many colons then, those within texts among them.
+    """
+    if _PERHAPS_COLON in text:
+        return False
+    try:
+        return _ENCODER.encode(value).count(b":") == text.count(b":")
+    except (ValueError, OverflowError, RecursionError):  # of what only the slower reader takes
+        return False
 
 
 def _row(line: bytes, number: int) -> Any:
     try:
         return _DECODER.decode(line)
-    except _UNREADABLE:
-        try:  # which takes NaN too, as many programs write it
-            return parse_json(line, finite=False)
-        except ValueError as error:
-            raise InputError(f"row {number} is no JSON object; write one object a line") from error
+    except _UNREADABLE:  # NaN is, too, as many programs write it
+        return _parsed(line, number)
+
+
+def _parsed(line: bytes, number: int) -> Any:
+    """A row by the slower reader, which takes NaN and sees a name that stands twice."""
+    try:
+        return parse_json(line, finite=False, object_pairs_hook=_object)
+    except ValueError as error:
+        raise InputError(f"row {number} is no JSON object; write one object a line") from error
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    held = dict(pairs)
+    return held if len(held) == len(pairs) else _Doubled(pairs)
 
 
 def _table(blocks: Iterator[list[Any]], size: int) -> ArrowTable:
@@ -138,10 +190,7 @@ def _table(blocks: Iterator[list[Any]], size: int) -> ArrowTable:
                     _require_room(names, size, rows + len(block))
                 held = columns[name]
                 if len(held) > index:
-                    raise InputError(
-                        f"row {rows + index + 1} has two values for the column {quoted(name)}; "
-                        "give each column its own name"
-                    )
+                    raise _two_values(name, rows + index + 1)
                 held += [None] * (index - len(held))
                 held.append(value)
         for held in columns.values():
@@ -171,11 +220,19 @@ def _flat(row: dict[str, Any], before: str, number: int, depth: int = 0) -> Iter
     """Names and values, those of objects within it under both names."""
     if depth > _DEEPEST:
         raise InputError(f"row {number} is nested too deeply; give each number a column of its own")
+    if isinstance(row, _Doubled):
+        raise _two_values(before + row.name, number)
     for key, value in row.items():
         if isinstance(value, dict):  # one without anything in it is nothing
             yield from _flat(value, f"{before}{key}.", number, depth + 1)
         else:
             yield f"{before}{key}", [None] if _holds_objects(value) else value
+
+
+def _two_values(name: str, number: int) -> InputError:
+    return InputError(
+        f"row {number} has two values for the column {quoted(name)}; give each column its own name"
+    )
 
 
 def _holds_objects(value: Any) -> bool:
