@@ -265,6 +265,11 @@ BAD: dict[str, tuple[str, Callable[[], bytes], str]] = {
         lambda: b'{"obs": ' + b'{"a": ' * 900 + b"1" + b"}" * 901 + b"\n",
         "row 1 is nested too deeply|row 1 is no JSON object",
     ),
+    "lists without end": (
+        "demo.jsonl",
+        lambda: b'{"episode": 0, "x": ' + 900 * b"[" + 900 * b"]" + b', "action": 0}\n',
+        "row 1 is nested too deeply",
+    ),
     "nested beyond all": (
         "demo.jsonl",
         lambda: b"[" * 10**6 + b"]" * 10**6,

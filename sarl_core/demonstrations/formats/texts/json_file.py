@@ -219,14 +219,18 @@ def _require_room(names: Collection[str], size: int, rows: int) -> None:
 def _flat(row: dict[str, Any], before: str, number: int, depth: int = 0) -> Iterator[Any]:
     """Names and values, those of objects within it under both names."""
     if depth > _DEEPEST:
-        raise InputError(f"row {number} is nested too deeply; give each number a column of its own")
+        raise _too_deep(number)
     if isinstance(row, _Doubled):
         raise _two_values(before + row.name, number)
     for key, value in row.items():
         if isinstance(value, dict):  # one without anything in it is nothing
             yield from _flat(value, f"{before}{key}.", number, depth + 1)
         else:
-            yield f"{before}{key}", [None] if _holds_objects(value) else value
+            yield f"{before}{key}", [None] if _holds_objects(value, number) else value
+
+
+def _too_deep(number: int) -> InputError:
+    return InputError(f"row {number} is nested too deeply; give each number a column of its own")
 
 
 def _two_values(name: str, number: int) -> InputError:
@@ -235,10 +239,12 @@ def _two_values(name: str, number: int) -> InputError:
     )
 
 
-def _holds_objects(value: Any) -> bool:
+def _holds_objects(value: Any, number: int, depth: int = 0) -> bool:
     """Whether it is a list with objects in it, which is no column of numbers."""
+    if depth > _DEEPEST:
+        raise _too_deep(number)
     return isinstance(value, list) and any(
-        isinstance(one, dict) or _holds_objects(one) for one in value
+        isinstance(one, dict) or _holds_objects(one, number, depth + 1) for one in value
     )
 
 
