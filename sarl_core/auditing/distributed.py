@@ -245,8 +245,8 @@ def survey_part(part: LogPart, reading: Reading, share: float) -> PartSurvey:
             sampled=np.zeros(_HEAD, dtype=np.bool_),
             rows=len(steps),
             episodes=steps.episodes[steps.episode_starts],
-            rising=True,
-            named=True,  # in a way: the numbers of its episodes are those in the whole log
+            names=(),  # the numbers of its episodes are those in the whole log
+            ends=None,
             sums=(0, 0),
             low=tuple(values.min(axis=0).tolist()),
             high=tuple(values.max(axis=0).tolist()),

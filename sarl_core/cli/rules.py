@@ -121,13 +121,14 @@ def mine(
         ),
     ] = None,
     seed: Annotated[
-        int,
+        int | None,
         typer.Option(
             "--seed",
             min=0,
             help="Draws the episodes that are held out, and the parts for --cross-fit.",
+            show_default="0",
         ),
-    ] = 0,
+    ] = None,
     lower_bound: Annotated[
         float | None,
         typer.Option(
@@ -175,6 +176,7 @@ def mine(
             as_json=as_json,
         )
         return
+    seed = seed or 0
     terminal.check_output(out, (".json",))
     given.require_some()
     if lower_bound and hold_out is None:
@@ -309,7 +311,7 @@ def _mine_at_a_distance(
     *,
     divider: int,
     hold_out: float | None,
-    seed: int,
+    seed: int | None,
     lower_bound: float | None,
     whole: str,
     as_json: bool,
@@ -329,10 +331,10 @@ def _mine_at_a_distance(
         )
     if not into_mined:
         given.require_some()
-    if of_mined and (hold_out is not None or len(files) > 1 or cluster is not None):
+    if of_mined and (len(files) > 1 or (hold_out, seed, cluster) != (None, None, None)):
         raise InputError(
-            f"{files[0]}: what is held out, and where, was settled when it was mined; give this "
-            "file alone, with thresholds"
+            f"{files[0]}: what is held out, and where, was settled when it was mined, and the seed "
+            "with it; give this file alone, with thresholds"
         )
     if of_mined:
         _require_no_reading(files, env, columns, derived, missing)
@@ -395,7 +397,7 @@ def _mine_at_a_distance(
                 divider=divider,
                 max_depth=given.max_depth,
                 hold_out=hold_out or 0.0,
-                seed=seed,
+                seed=seed or 0,
                 progress=advance,
                 **floor,
             )

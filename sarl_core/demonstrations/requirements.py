@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from sarl_core.decimals import decimal_text
 from sarl_core.demonstrations.splits import written_value
-from sarl_core.errors import InputError
+from sarl_core.errors import InputError, quoted
 from sarl_core.shared_arrays import is_shared
 
 FEW_VALUES = 32  # whole numbers written as 0.0, 1.0 are labels up to so many of them
@@ -429,6 +429,7 @@ def require_order(
     steps: NDArray[np.int64] | None,
     columns: tuple[str, str] = ("column 'episode'", "column 'step'"),
     rows: NDArray[np.int64] | None = None,
+    names: Mapping[int, str] | None = None,
 ) -> None:
     """Refuse episodes that are scattered and steps that do not rise within an episode.
 
@@ -437,17 +438,23 @@ def require_order(
         steps: Shape (N,), or None.
         columns: What the two are called in the message.
         rows: Shape (N,), the rows they had in the file, from 0; None if they are those.
+        names: What numbers of episodes stand for; None where they are those of the file.
 
     Raises:
         InputError: With the first row.
     """
+
+    def called(row: int) -> str:
+        number = int(episodes[row])
+        return quoted(names[number]) if names and number in names else str(number)
+
     same_episode = episodes[1:] == episodes[:-1]
     starts = np.concatenate([[0], np.flatnonzero(~same_episode) + 1])
     _, first_seen = np.unique(episodes[starts], return_index=True)
     if len(first_seen) < len(starts):
         row = int(starts[np.setdiff1d(np.arange(len(starts)), first_seen)[0]])
         raise InputError(
-            f"{columns[0]} comes back to {episodes[row]} in row {_number(row, rows)} after another "
+            f"{columns[0]} comes back to {called(row)} in row {_number(row, rows)} after another "
             "episode; keep the steps of an episode together"
         )
     if steps is None:
@@ -457,5 +464,5 @@ def require_order(
         row = int(np.argmax(backwards)) + 1
         raise InputError(
             f"{columns[1]} goes from {steps[row - 1]} to {steps[row]} in row {_number(row, rows)} "
-            f"within episode {episodes[row]}; sort the steps of each episode"
+            f"within episode {called(row)}; sort the steps of each episode"
         )

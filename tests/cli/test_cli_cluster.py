@@ -56,6 +56,30 @@ def test_rules_of_a_cluster_are_those_of_its_mined_file(run, running_cluster, mi
     assert RuleSet.load(direct).rule_count == answer["rules"] > 20
 
 
+def test_when_rules_of_a_cluster_are_those_of_one_memory(run, running_cluster, tmp_path):
+    """With trees of the same depth, and where no node of up to 500 states is split."""
+    there, here = tmp_path / "there.json", tmp_path / "here.json"
+    whole = tmp_path / "whole.mined"
+
+    def same():
+        first, second = RuleSet.load(there), RuleSet.load(here)
+        assert first.rule_count > 1
+        assert [(one.conditions, one.action, one.samples) for one in first] == [
+            (one.conditions, one.action, one.samples) for one in second
+        ]
+
+    cluster_of = ("mine", LANDER, "--cluster", running_cluster)
+    memory = ("mine", LANDER, "--learner", "histogram", "--out", here)
+    of_many = ("--support", "0.034", "--confidence", "0.8")  # 510 states
+    run(*cluster_of, *of_many, "--out", there)
+    run(*memory, *of_many)
+    same()
+    run(*cluster_of, "--support", "0", "--out", whole)
+    run("mine", whole, *FILTERED, "--out", there)
+    run(*memory, *FILTERED)
+    same()
+
+
 def test_rules_that_forbid_are_mined_from_its_mined_file(run, mined_file, tmp_path):
     out = tmp_path / "never.json"
     command = ("mine", mined_file, "--never", "0.1", "--support", "0.01", "--out", out)
@@ -118,6 +142,8 @@ def test_a_mined_file_answers_check_and_landscape(run, mined_file, tmp_path):
     assert document["held_out_episodes"] == 19
     assert document["min_support"] == 0.001
     assert sum(document["trees"][0]["labels"].values()) == document["steps"]
+    medians = {one["name"]: one["median"] for one in document["features"]}
+    assert {medians[name] for name in medians if "contact" in name} <= {0.0, 1.0}
     assert "what is left of" in run("check", mined_file)
     printed = run("landscape", mined_file, "--out", tmp_path / "plane.json")
     assert "grown down to a support of 0.001" in printed
@@ -148,6 +174,10 @@ WRONG = {
     ),
     "other episodes": (
         ["MINED", "--hold-out", "0.5", *FILTERED, "--out", "r.json"],
+        "what is held out, and where, was settled when it was mined",
+    ),
+    "a seed of what was drawn": (
+        ["MINED", "--seed", "0", *FILTERED, "--out", "r.json"],
         "what is held out, and where, was settled when it was mined",
     ),
     "too little support": (

@@ -33,9 +33,11 @@ def describe_mined(mined: MinedData, path: Path) -> dict[str, Any]:
                 "name": feature.name,
                 "unit": feature.unit,
                 "bins": len(one.counts),
-                "median": one.quantile(0.5),
+                "median": mined.median(index),
             }
-            for feature, one in zip(source.features, mined.histograms, strict=True)
+            for index, (feature, one) in enumerate(
+                zip(source.features, mined.histograms, strict=True)
+            )
         ],
         "trees": [
             {

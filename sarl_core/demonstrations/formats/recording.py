@@ -106,6 +106,7 @@ def to_demonstrations(
     recording: Recording,
     description: EnvironmentDescription | None,
     missing: Missing = "refuse",
+    episode_names: Mapping[int, str] | None = None,
 ) -> Demonstrations:
     """Complete what a file holds and check it.
 
@@ -113,6 +114,7 @@ def to_demonstrations(
         recording: What it holds.
         description: The environment to take from what the file does not say, or None.
         missing: What becomes of steps without one of their values.
+        episode_names: What numbers of episodes stand for; None where they are those of the file.
 
     Returns:
         The demonstrations.
@@ -131,7 +133,8 @@ def to_demonstrations(
         recording = _fit(recording, described)
     observations = _owned(recording.observations, np.float32)
     coarse = coarse_columns(recording.observations, observations, recording.observation_columns)
-    recording = _without_last_observations(_checked(replace(recording, observations=observations)))
+    recording = replace(recording, observations=observations)
+    recording = _without_last_observations(_checked(recording, episode_names))
     recording = _complete(recording, missing)
     require_finite(recording.observations, recording.observation_columns, recording.rows)
     discrete, note = _is_discrete(recording, described)
@@ -266,7 +269,7 @@ def _in_order(recording: Recording, described: EnvironmentDescription) -> Record
     return replace(recording, notes=(*recording.notes, *notes))
 
 
-def _checked(recording: Recording) -> Recording:
+def _checked(recording: Recording, episode_names: Mapping[int, str] | None) -> Recording:
     """Number the episodes and check what else there is, under the file's own names."""
     n = len(recording.actions)
     recording = _with_short_numbers(recording)
@@ -281,12 +284,8 @@ def _checked(recording: Recording) -> Recording:
         if values is not None:
             columns[attribute] = check(values, n, _called(recording, role), recording.rows)
     recording = _in_episodes(replace(recording, **columns))
-    require_order(
-        _some(recording.episodes),
-        recording.steps,
-        (_called(recording, "episode"), _called(recording, "step")),
-        recording.rows,
-    )
+    called = (_called(recording, "episode"), _called(recording, "step"))
+    require_order(_some(recording.episodes), recording.steps, called, recording.rows, episode_names)
     return recording
 
 

@@ -109,8 +109,7 @@ def counted_feature_rows(mined: MinedData) -> tuple[FeatureRow, ...]:
         mined: Over N pairs.
 
     Returns:
-        d rows; the median is the nearest border between bins, and the least value where there is
-        one bin.
+        d rows; where in its bin a median lies, the sample says.
     """
     box = mined.boxes[0][:, 0]  # of the root
     return tuple(
@@ -118,11 +117,11 @@ def counted_feature_rows(mined: MinedData) -> tuple[FeatureRow, ...]:
             feature.name,
             feature.unit,
             float(low),
-            histogram.quantile(0.5) if len(histogram.borders) else float(low),
+            mined.median(index),
             float(high),
         )
-        for feature, histogram, low, high in zip(
-            mined.sample.features, mined.histograms, box[0], box[3], strict=True
+        for index, (feature, low, high) in enumerate(
+            zip(mined.sample.features, box[0], box[3], strict=True)
         )
     )
 

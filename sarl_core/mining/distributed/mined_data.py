@@ -37,20 +37,33 @@ class FeatureHistogram:
     borders: Floats
     counts: NDArray[np.int64]
 
-    def quantile(self, share: float) -> float:
-        """A border that about so many pairs do not exceed.
+    def median(self, sample: NDArray[np.float32]) -> float:
+        """The middle of all pairs: which bin it is in was counted, and where in it a sample says.
 
         Args:
-            share: From 0 to 1.
+            sample: Values of some of these pairs, (M,), M >= 1.
 
         Returns:
-            The first border that at least so many do not exceed; NaN where all pairs are in one
-            bin.
+            Exact where bins hold one value each, as those of words and flags do, or the sample is
+            all pairs.
         """
-        if not len(self.borders):
-            return float("nan")
-        most = np.searchsorted(self.counts.cumsum(), share * self.counts.sum())
-        return float(self.borders[min(int(most), len(self.borders) - 1)])
+        values = np.sort(sample)
+        bins = np.searchsorted(self.borders, values.astype(np.float64))
+        ends = self.counts.cumsum()
+
+        def value(rank: int) -> float:
+            at = int(np.searchsorted(ends, rank, side="right"))
+            first, last = np.searchsorted(bins, [at, at + 1]).tolist()
+            if first == last:  # the sample has none of them
+                return float(self.borders[min(at, len(self.borders) - 1)])
+            before = rank - int(ends[at] - self.counts[at])
+            return float(values[first + before * (last - first) // int(self.counts[at])])
+
+        pairs = int(ends[-1])
+        # Of an infinite and a negatively infinite value none is the middle: then the lower one is.
+        with np.errstate(invalid="ignore"):
+            middle = float(np.median([value((pairs - 1) // 2), value(pairs // 2)]))
+        return -np.inf if np.isnan(middle) else middle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -121,6 +134,14 @@ class MinedData:
     def held_out_episodes(self) -> int:
         """Number of episodes that were held out."""
         return len(self.held_out[0].numbers) if self.held_out else 0
+
+    def median(self, feature: int) -> float:
+        """That of a feature over all pairs, as `FeatureHistogram.median` has it.
+
+        Args:
+            feature: Its index.
+        """
+        return self.histograms[feature].median(self.sample.observations[:, feature])
 
     def renamed(self, sample: Demonstrations) -> MinedData:
         """The same under the names of its sample.

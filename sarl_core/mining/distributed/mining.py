@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
@@ -45,6 +44,7 @@ from sarl_core.mining.distributed.survey import (
 )
 from sarl_core.mining.envelope import HIGH_QUANTILE, LOW_QUANTILE
 from sarl_core.mining.evidence import EpisodeCounts
+from sarl_core.mining.growing.growth import fewest_pairs
 from sarl_core.mining.growing.histogram import BinnedStates
 from sarl_core.mining.growing.structure import TreeStructure, tree_levels, tree_of_counts
 from sarl_core.mining.labels import label_dimensions
@@ -216,7 +216,7 @@ def mine_on_cluster(
                 labels[index, : dimension.n_labels],
                 bins,
                 dimension=index,
-                least=math.ceil(plan.min_support * steps),
+                least=fewest_pairs(float(plan.min_support), steps),
                 max_depth=plan.max_depth,
                 seed=plan.seed,
                 advance=growing(index),

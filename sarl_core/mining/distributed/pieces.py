@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -186,10 +186,12 @@ class PieceSteps(NamedTuple):
         steps: At least two, as demonstrations are.
         own: How many of them, from the first, are steps of the piece: where it has one alone, a
             copy stands behind that.
+        names: What the numbers of its episodes stand for; {} where they are those of the file.
     """
 
     steps: Demonstrations
     own: int
+    names: Mapping[int, str]
 
     @property
     def real(self) -> NDArray[np.bool_]:
@@ -217,8 +219,9 @@ def read_piece(piece: Piece, reading: Reading) -> PieceSteps | None:
             table = file.read_row_groups(groups, use_threads=False)
         recording = recording_from_table(arrow_table(table), reading.columns, reading.description)
         named = _name_column(recording.columns, table.schema)
+        names: dict[int, str] = {}
         if named:
-            table = _with_numbers(table, named)
+            table, names = _with_numbers(table, named)
             recording = recording_from_table(
                 arrow_table(table), reading.columns, reading.description
             )
@@ -232,17 +235,17 @@ def read_piece(piece: Piece, reading: Reading) -> PieceSteps | None:
         if count == 1:
             recording = _doubled(recording, 0)
         try:
-            read = to_demonstrations(recording, reading.description, reading.missing)
+            read = to_demonstrations(recording, reading.description, reading.missing, names)
         except TooFewStepsError as error:
             if not len(error.left) or count == 1:
                 return None
             recording, count = _doubled(recording, int(error.left[0])), 1
-            read = to_demonstrations(recording, reading.description, reading.missing)
+            read = to_demonstrations(recording, reading.description, reading.missing, names)
         if reading.formulas:
             read = with_formulas(read, reading.formulas)
         if reading.features is not None:
             read = recoded(read, reading.features, called="it")
-        return PieceSteps(read, 1 if count == 1 else len(read))
+        return PieceSteps(read, 1 if count == 1 else len(read), names)
 
 
 def _doubled(recording: Recording, row: int) -> Recording:
@@ -259,22 +262,6 @@ def _doubled(recording: Recording, row: int) -> Recording:
         episodes=episodes + np.array([0, 1]),
         **{name: twice(getattr(recording, name)) for name in names},
     )
-
-
-def has_named_episodes(piece: Piece, columns: Sequence[ColumnUse]) -> bool:
-    """Whether words say to which episode a row of a piece belongs: the same ones in every file.
-
-    Args:
-        piece: Of a file that this process can open.
-        columns: What its columns were taken for.
-
-    Returns:
-        Whether numbers stand for them.
-    """
-    import pyarrow.parquet as pq
-
-    with refusing_damage(), pq.ParquetFile(piece.path) as file:
-        return bool(_name_column(columns, file.schema_arrow))
 
 
 def some_rows(demonstrations: Demonstrations, rows: NDArray[np.bool_]) -> Demonstrations:
@@ -306,18 +293,19 @@ def _name_column(columns: Sequence[ColumnUse], schema: Any) -> str:
     return called[0] if words else ""
 
 
-def _with_numbers(table: Any, column: str) -> Any:
-    """A table whose episodes have numbers for names: the same ones in every piece."""
+def _with_numbers(table: Any, column: str) -> tuple[Any, dict[int, str]]:
+    """A table whose episodes have numbers for names, the same in every piece; and these names."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
     texts = pc.dictionary_encode(pc.cast(table.column(column), pa.large_string()))
     whole = texts.unify_dictionaries().combine_chunks()
     whole = whole.chunk(0) if isinstance(whole, pa.ChunkedArray) else whole
-    numbers = pa.array([_number(text) for text in whole.dictionary.to_pylist()], pa.int64())
-    return table.set_column(
-        table.schema.get_field_index(column), column, numbers.take(whole.indices)
-    )
+    words = whole.dictionary.to_pylist()
+    numbers = list(map(_number, words))
+    place = table.schema.get_field_index(column)
+    coded = pa.array(numbers, pa.int64()).take(whole.indices)
+    return table.set_column(place, column, coded), dict(zip(numbers, words, strict=True))
 
 
 def _number(text: str) -> int:

@@ -19,13 +19,19 @@ from sarl_core.demonstrations.dataset import (
 )
 from sarl_core.demonstrations.formats.columns import SINGLES, ColumnMap
 from sarl_core.demonstrations.formats.mapping.roles import ROLE_WORDS
+from sarl_core.demonstrations.formats.sets.table_set import renumbered
 from sarl_core.demonstrations.recoding import recoded
-from sarl_core.demonstrations.words import columns_of_words, indicators_of, spelled, words_of
+from sarl_core.demonstrations.words import (
+    columns_of_words,
+    counted_as_they_come,
+    indicators_of,
+    spelled,
+    words_of,
+)
 from sarl_core.errors import InputError, quoted
 from sarl_core.mining.distributed.pieces import (
     Piece,
     Reading,
-    has_named_episodes,
     read_piece,
     some_rows,
 )
@@ -47,9 +53,9 @@ class Survey:
         head: Some of its steps, two or more: those that are in the sample, and the first ones.
         sampled: Which of them are, (k,).
         rows: How many steps the piece has.
-        episodes: The numbers of its episodes, ascending.
-        rising: Whether they stand in that order.
-        named: Whether numbers stand for words, which are the same in every file.
+        episodes: The numbers of its episodes, (e,), in the order in which they come.
+        names: What they stand for, e words; () where they are those of the file.
+        ends: The numbers of its first and its last step; None where no column numbers the steps.
         sums: Of the keys of all rows, two of them: whatever the order of the rows is.
         low: Least action in each dimension, (m,).
         high: Largest, likewise.
@@ -59,11 +65,15 @@ class Survey:
     sampled: NDArray[np.bool_]
     rows: int
     episodes: NDArray[np.int64]
-    rising: bool
-    named: bool
+    names: tuple[str, ...]
+    ends: tuple[int, int] | None
     sums: tuple[int, int]
     low: tuple[float, ...]
     high: tuple[float, ...]
+
+    def called(self, place: int) -> str:
+        """One of its episodes, as its file has it."""
+        return quoted(self.names[place]) if self.names else str(self.episodes[place])
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,20 +150,22 @@ def survey_piece(piece: Piece, reading: Reading, share: float) -> Survey | None:
     given = read_piece(piece, reading)
     if given is None:
         return None
-    read, count = given
+    read, count, names = given
     keys = row_keys(read)
     chosen = keys < np.uint64(min(share * _MOST, _MOST - 2**12)) if share < 1.0 else keys >= 0
     chosen &= given.real
     some = chosen | (np.arange(len(read)) < _FEWEST)
-    keys, actions = keys[:count], read.action_columns[:count]
+    keys, actions, steps = keys[:count], read.action_columns[:count], read.steps
     numbers = read.episodes[read.episode_starts[read.episode_starts < count]]
     return Survey(
         head=some_rows(read, some),
         sampled=chosen[some],
         rows=count,
-        episodes=np.unique(numbers),
-        rising=bool((np.diff(numbers) > 0).all()),
-        named=has_named_episodes(piece, read.columns),
+        episodes=numbers,
+        names=tuple(names[number] for number in numbers.tolist()) if names else (),
+        ends=(int(steps[0]), int(steps[count - 1]))
+        if steps is not None and _says_steps(read)
+        else None,
         sums=(_sum(keys), _sum(_mixed(keys ^ _OTHER))),
         low=tuple(actions.min(axis=0).tolist()),
         high=tuple(actions.max(axis=0).tolist()),
@@ -192,6 +204,7 @@ def layout_of(pieces: Sequence[Piece], surveys: Sequence[Survey]) -> Layout:
     features = _common_features(pieces, surveys)
     dimensions = [_common_dimension(index, pieces, surveys) for index in range(_width(first))]
     offsets = _offsets(pieces, surveys)
+    _require_order(pieces, surveys, offsets)
     fields: dict[str, Any] = {
         "feature_names": tuple(one.name for one in features),
         "feature_units": tuple(one.unit for one in features),
@@ -412,30 +425,58 @@ def _common_dimension(
 
 def _offsets(pieces: Sequence[Piece], surveys: Sequence[Survey]) -> tuple[int, ...]:
     """What to add to the numbers of episodes where those of each file begin again."""
-    files: list[list[Survey]] = [
-        [survey for _, survey in same]
-        for _, same in groupby(zip(pieces, surveys, strict=True), lambda one: one[0].file)
-    ]
-    places = [file for file, _ in groupby(piece.file for piece in pieces)]
-    numbers = [np.unique(np.concatenate([one.episodes for one in several])) for several in files]
-    offsets = dict.fromkeys(range(places[-1] + 1), 0)
-    if any(one.named for several in files for one in several):
-        return tuple(offsets.values())
-    if sum(map(len, numbers)) > len(np.unique(np.concatenate(numbers))) and not _continue(files):
-        after = 0
-        for place, own in zip(places, numbers, strict=True):
-            offsets[place] = after - int(own[0])
-            after += int(own[-1] - own[0]) + 1
+    offsets = dict.fromkeys(range(pieces[-1].file + 1), 0)
+    known = groupby(zip(pieces, surveys, strict=True), lambda one: one[0].file)
+    files = {file: np.concatenate([survey.episodes for _, survey in same]) for file, same in known}
+    numbers = np.concatenate(list(files.values()))
+    named = bool(surveys[0].names)
+    own = counted_as_they_come(numbers) if named else numbers  # as they are read in one memory
+    placed = renumbered(own, list(map(len, files.values())))
+    if placed is not own:
+        first = 0
+        for file, of_file in files.items():
+            # Numbers that stand for words are numbers by chance: so are their neighbours.
+            offsets[file] = file if named else int(placed[first] - own[first])
+            first += len(of_file)
     return tuple(offsets.values())
 
 
-def _continue(files: Sequence[Sequence[Survey]]) -> bool:
-    """Whether files are pieces of one table: numbers go on from each to the next."""
-    surveys = [survey for several in files for survey in several]
-    rising = all(survey.rising for survey in surveys) and all(
-        before.episodes[-1] <= after.episodes[0] for before, after in pairwise(surveys)
-    )
-    return rising and surveys[0].episodes[0] != surveys[-1].episodes[-1]
+def _require_order(
+    pieces: Sequence[Piece], surveys: Sequence[Survey], offsets: Sequence[int]
+) -> None:
+    """Refuse an episode that comes back, or whose steps begin again, in another piece."""
+    placed = [
+        survey.episodes + offsets[piece.file] for piece, survey in zip(pieces, surveys, strict=True)
+    ]
+    for at, (before, after) in enumerate(pairwise(surveys), 1):
+        if placed[at - 1][-1] != placed[at][0] or before.ends is None or after.ends is None:
+            continue
+        if after.ends[0] <= before.ends[1]:
+            column = _column_of("step", after.head)
+            raise InputError(
+                f"{pieces[at].name}: {column} goes from {before.ends[1]} to {after.ends[0]} within "
+                f"episode {after.called(0)}, which goes on from {pieces[at - 1].name}; sort the "
+                "steps of each episode, or give another episode another name"
+            )
+    numbers = np.concatenate(placed)
+    starts = np.flatnonzero(np.append(True, numbers[1:] != numbers[:-1]))
+    _, first = np.unique(numbers[starts], return_index=True)
+    again = np.setdiff1d(np.arange(len(starts)), first)
+    if len(again):
+        begins = np.cumsum([0, *map(len, placed)])
+        row = starts[again[0]]
+        at = int(np.searchsorted(begins, row, side="right")) - 1
+        raise InputError(
+            f"{pieces[at].name}: {_column_of('episode', surveys[at].head)} comes back to "
+            f"{surveys[at].called(int(row - begins[at]))} after another episode; keep the steps of "
+            "an episode together"
+        )
+
+
+def _column_of(role: str, head: Demonstrations) -> str:
+    """The column of a role, as sentences call it."""
+    columns = [one.column for one in head.columns if one.use == ROLE_WORDS[role]]
+    return f"column {quoted(columns[0] if columns else role)}"
 
 
 def _placed(

@@ -111,8 +111,9 @@ def grow_policy_trees(
             case. A leaf that no border between bins parts better stays mixed.
         min_support: No node with less support is split further: no rule at that minimum support,
             or a higher one, needs it. Rules at a lower one are not those of fully grown trees.
-            The histogram learner then takes a part of the time, and may choose otherwise among
-            equally good queries than it does without.
+            The histogram learner then takes a part of the time, but is not the same tree cut
+            shorter: whether it sorts the states of a node of some hundred, or takes bins of them
+            together, depends on how many nodes are to come.
 
     Returns:
         One tree an action dimension.
@@ -175,7 +176,7 @@ def grow_structures(
     ]
     states = demonstrations.observations
     if learner_for(learner, len(demonstrations)) == "histogram":
-        least = _least(float(min_support), len(demonstrations))
+        least = fewest_pairs(float(min_support), len(demonstrations))
         bins = BinnedStates.of(states)
         grown = tuple(
             GrownTree(
@@ -225,7 +226,7 @@ def counted_trees(
     Returns:
         One tree an action dimension.
     """
-    least = _least(float(min_support), len(demonstrations))
+    least = fewest_pairs(float(min_support), len(demonstrations))
 
     def counted(index: int, one: GrownTree) -> PolicyTree:
         tree = count_tree(
@@ -269,8 +270,13 @@ def part_of_tree(
     return exact_structure(observations, labels, max_depth=max_depth)
 
 
-def _least(min_support: float, pairs: int) -> int:
-    """The fewest pairs that have a support, by the comparison that rules are cut by."""
+def fewest_pairs(min_support: float, pairs: int) -> int:
+    """The fewest pairs that have a support, by the comparison that rules are cut by.
+
+    Args:
+        min_support: From 0 to 1.
+        pairs: How many there are.
+    """
     least = math.ceil(min_support * pairs)
     return next(some for some in (least - 1, least, least + 1) if some / pairs >= min_support)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sarl_core import InputError, WorkError
+from sarl_core import InputError, WorkError, load_demonstrations
 from sarl_core.clusters import cluster, saying_losses
 from sarl_core.mining.distributed import pieces
 from sarl_core.mining.distributed.mining import mine_files
@@ -264,3 +264,55 @@ def test_files_without_any_whole_step_are_refused(tmp_path: Path, mine: Mine) ->
     table = steps().assign(obs_gap=np.nan, obs_speed=np.nan)
     with pytest.raises(InputError, match="hardly a step of these files has all of its values"):
         mine(folder_of(tmp_path / "logs", table[:200], table[200:]), missing="drop")
+
+
+@pytest.mark.parametrize("numbered", [False, True])
+def test_names_of_episodes_that_begin_again_are_other_episodes(
+    tmp_path: Path, mine: Mine, numbered: bool
+) -> None:
+    named = [
+        steps(seed=seed).assign(episode=lambda one: "run " + one.episode.astype(str))
+        for seed in range(3)
+    ]
+    if numbered:
+        named = [table.assign(step=np.arange(400) % 50) for table in named]
+    folder = folder_of(tmp_path / "logs", *named)
+    mined = mine(folder, hold_out=0.5)
+    assert mined.trees[0].source.episodes + mined.held_out_episodes == 24
+    assert load_demonstrations(folder).n_episodes == 24
+    assert mined.held_out[0].lengths.tolist() == [50] * 12
+
+
+def test_named_episodes_go_on_where_one_does(tmp_path: Path, mine: Mine) -> None:
+    """The last of the first file is the first of the second: these are pieces of one table."""
+    first = steps().assign(episode=lambda one: "run " + one.episode.astype(str))
+    second = steps(seed=1).assign(episode=lambda one: "run " + (one.episode + 7).astype(str))
+    folder = folder_of(tmp_path / "logs", first, second)
+    assert mine(folder).trees[0].source.episodes == 15
+    assert load_demonstrations(folder).n_episodes == 15
+
+
+def test_an_episode_that_is_refused_is_called_as_in_its_file(
+    tmp_path: Path, mine: Mine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    table = steps().assign(episode=lambda one: "run " + one.episode.astype(str))
+    table = table.assign(step=np.arange(400) % 50)
+    with pytest.raises(
+        InputError, match=r"log-0.parquet: column 'step' goes from 9 to 3 .* episode 'run 0'; sort"
+    ):
+        mine(folder_of(tmp_path / "falls", table.assign(step=table.step.replace(10, 3))))
+    again = table[350:].assign(step=np.arange(50))
+    with pytest.raises(
+        InputError,
+        match=r"log-1.parquet: column 'step' goes from 49 to 0 within episode 'run 7', which goes "
+        r"on from log-0.parquet; sort",
+    ):
+        mine(folder_of(tmp_path / "again", table, again))
+    monkeypatch.setattr(pieces, "ROWS", 100)
+    (tmp_path / "back").mkdir()
+    back = pd.concat([table, table[:50].assign(step=np.arange(50, 100))])
+    back.to_parquet(tmp_path / "back" / "log.parquet", row_group_size=100)
+    with pytest.raises(
+        InputError, match=r"log.parquet: column 'episode' comes back to 'run 0' after another"
+    ):
+        mine(tmp_path / "back")
