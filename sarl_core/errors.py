@@ -126,9 +126,13 @@ def require_whole(name: str, value: int, least: int, most: int | None = None) ->
     """
     require(value, Integral, f"{name} must be a whole number", "give one")
     if value < least:
-        raise InputError(f"{name} is {value} and must be at least {least}; give a larger one")
+        raise InputError(
+            f"{name} is {quoted(value)} and must be at least {least}; give a larger one"
+        )
     if most is not None and value > most:
-        raise InputError(f"{name} is {value} and must be at most {most}; give a smaller one")
+        raise InputError(
+            f"{name} is {quoted(value)} and must be at most {most}; give a smaller one"
+        )
 
 
 def _kind_of(value: object) -> str:

@@ -22,6 +22,7 @@ from sarl_core.environments.feature_order import (
     compared_names,
     line_up,
     only_counts,
+    plain_names,
     shortened,
 )
 from sarl_core.errors import InputError
@@ -265,15 +266,15 @@ def _labels(
             f"({shortened(dimension.label_names)}) and an amount in {called}; {_CURE}"
         )
     own = demonstrated.labels_of(values)
-    wanted, have = compared_names(dimension.label_names, demonstrated.labels)
-    numbers = dict(zip(dimension.actions, range(len(wanted)), strict=True))
-    if _is_number(demonstrated) and set(have) - set(wanted):
+    places = _label_places(dimension.label_names, demonstrated.labels)
+    numbers = {action: place for place, action in enumerate(dimension.actions)}
+    if _is_number(demonstrated) and -1 in places:
         # Numbers without names: the action is the same number.
         translated = np.array([numbers.get(action, -1) for action in demonstrated.actions])
-    elif set(have).isdisjoint(wanted) and len(have) == len(wanted) and _numbered(dimension):
-        translated = np.arange(len(have))
+    elif {*places} == {-1} and len(places) == len(numbers) and _numbered(dimension):
+        translated = np.arange(len(places))
     else:
-        translated = np.array([wanted.index(name) if name in wanted else -1 for name in have])
+        translated = np.array(places)
     labels = translated[own]
     unknown = labels < 0
     if unknown.any():
@@ -285,6 +286,17 @@ def _labels(
             "or mine from demonstrations with it"
         )
     return np.asarray(labels, dtype=np.int64)
+
+
+def _label_places(wanted: Sequence[str], have: Sequence[str]) -> list[int]:
+    """For each label of a log its place among those of the rules, or -1; several may have one."""
+    plain = plain_names(wanted)
+    alike = {name: place for place, name in enumerate(plain) if plain.count(name) == 1}
+    exactly = {name: place for place, name in enumerate(wanted)}
+    return [
+        exactly.get(name, alike.get(plain_name, -1))
+        for name, plain_name in zip(have, plain_names(have), strict=True)
+    ]
 
 
 def _is_number(demonstrated: ActionDimension) -> bool:

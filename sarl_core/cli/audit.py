@@ -131,10 +131,9 @@ def audit(
         from sarl_core.auditing.audit import audit as against
         from sarl_core.auditing.comparison import LogComparison
         from sarl_core.auditing.guards import guard
-        from sarl_core.auditing.reference import reference_of
+        from sarl_core.auditing.matching import matched_states
         from sarl_core.explaining.exports.audit import audit_document
         from sarl_core.mining.rule_set import RuleSet
-        from sarl_core.shielding.shield import Shield
 
         guards = [guard(text) for text in fail_on or ()]
         rule_set = RuleSet.load(rules)
@@ -149,7 +148,7 @@ def audit(
 
         if demonstrations is not None and mined_from is not None:
             with _naming(demonstrations):  # what does not fit in them is no fault of the log
-                reference_of(Shield(rule_set), mined_from)
+                matched_states(rule_set, mined_from, called="the demonstrations")
 
         def hold(path: Path | list[Path], steps: Demonstrations | None = None) -> Audit:
             with _naming(path):

@@ -66,22 +66,30 @@ def _indicating(
     features = observed_features(features)
     observed = demonstrations.observed
     indicators = [one.indicator for one in observed]
-    by_column = [
-        columns_of_words(each) for each in ([one.indicator for one in features], indicators)
-    ]
-    *columns_each, read_from = compared_names(
-        *map(tuple, by_column),
-        [one.indicator.column if one.indicator else one.name for one in observed],
-    )
-    wanted, own = (
-        dict(zip(names, places.values(), strict=True))
-        for names, places in zip(columns_each, by_column, strict=True)
-    )
+    theirs = columns_of_words([one.indicator for one in features])
+    ours = columns_of_words(indicators)
+    their_names, own_names = compared_names(tuple(theirs), tuple(ours))
+    wanted = dict(zip(their_names, theirs.values(), strict=True))
+    own = dict(zip(own_names, ours.values(), strict=True))
     if not wanted or [one.indicator for one in features] == indicators:
         return demonstrations
     columns: list[np.ndarray[tuple[int], np.dtype[np.float32]]] = []
     said: list[Feature] = []
-    for at, (feature, column) in enumerate(zip(observed, read_from, strict=True)):
+    read_from = {at: column for column, places in own.items() for at in places}
+    # What is true or false may be written as 1 and 0.
+    numbers = [at for at, one in enumerate(indicators) if one is None]
+    truths = {
+        column: name
+        for (column, places), name in zip(theirs.items(), their_names, strict=True)
+        if _is_truth(features, places)
+    }
+    of_numbers, of_truths = compared_names([observed[at].name for at in numbers], tuple(truths))
+    flags = dict(zip(of_truths, truths.values(), strict=True))
+    read_from |= {
+        at: flags[name] for at, name in zip(numbers, of_numbers, strict=True) if name in flags
+    }
+    for at, feature in enumerate(observed):
+        column = read_from.get(at, "")
         together = own.get(column, [at])
         if column not in wanted or at != together[0]:
             if column not in wanted or feature.indicator is None:
@@ -105,6 +113,11 @@ def _indicating(
         feature_units=tuple(one.unit for one in said),
         indicators=tuple(one.indicator for one in said),
     )
+
+
+def _is_truth(features: Sequence[Feature], places: Sequence[int]) -> bool:
+    said = [features[place].indicator for place in places]
+    return all(one is not None and one.is_truth for one in said)
 
 
 def _words(demonstrations: Demonstrations, places: Sequence[int]) -> Coded | None:

@@ -221,17 +221,11 @@ def compared_names(*several: Sequence[str]) -> list[list[str]]:
         As many for each: plain ones (`plain_names`), but for those that one thing uses for two,
         as x and X, which stay as they are written.
     """
-    plain = [plain_names(names) for names in several]
+    plain = [dict(zip(names, plain_names(names), strict=True)) for names in several]
     doubled = {
-        name
-        for names, plainly in zip(several, plain, strict=True)
-        for name, count in Counter(dict(zip(names, plainly, strict=True)).values()).items()
-        if count > 1
+        name for each in plain for name, count in Counter(each.values()).items() if count > 1
     }
     return [
-        [
-            name if plain_name in doubled else plain_name
-            for name, plain_name in zip(names, plainly, strict=True)
-        ]
-        for names, plainly in zip(several, plain, strict=True)
+        [name if each[name] in doubled else each[name] for name in names]
+        for names, each in zip(several, plain, strict=True)
     ]

@@ -209,6 +209,29 @@ def test_a_word_that_rules_do_not_know_is_named() -> None:
         rules_for(rules, strange)
 
 
+def test_labels_of_a_log_may_be_spelled_in_several_ways() -> None:
+    rules = mined_words()
+    lines = ROWS.splitlines(keepends=True)
+    mixed = "".join(
+        line.replace("brake", "Brake") if at % 2 else line for at, line in enumerate(lines)
+    )
+    assert len(read(mixed).label_names[0]) == 3
+    assert audit(rules, read(mixed)).broken == audit(rules, read(ROWS)).broken
+
+
+def test_numbers_are_no_words_whatever_their_column_is_called() -> None:
+    rules = mined_words()
+    beside = "".join(
+        f"{'MODE' if not at else at % 2},{line}"
+        for at, line in enumerate(ROWS.splitlines(keepends=True))
+    )
+    held = audit(rules, read(beside))
+    assert held.agreement == audit(rules, read(ROWS)).agreement
+    assert any("MODE of the log is no feature of the rules" in note for note in held.notes)
+    flags = read(ROWS.replace("true", "1").replace("false", "0"))
+    assert audit(rules, flags).agreement == held.agreement
+
+
 def test_words_are_said_in_edits_and_near_misses() -> None:
     rules = mined_words()
     features = rules.source.features

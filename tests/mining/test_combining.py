@@ -339,6 +339,8 @@ def test_features_whose_names_differ_in_capitals_alone_are_two_features() -> Non
     apart = replace(plain, feature_names=("x", "v", "contact", "w"))
     for names, others in (("X,v", "w,v"), ("x,v", "x,v"), ("x,X", "x,w")):
         assert pairs_by_name(alike, [names]) == pairs_by_name(apart, [others])
+    spaced = replace(plain, feature_names=("x", "v", "contact", "X "))
+    assert pairs_by_name(spaced, ["X ,x"]) == ((3, 0),)
     mined = with_combinations(alike)
     assert [one.definition.terms for one in mined.derived] == [
         one.definition.terms for one in with_combinations(apart).derived

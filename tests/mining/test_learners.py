@@ -288,3 +288,13 @@ def test_trees_of_another_process_are_small_on_the_way_and_the_same_when_counted
     assert len(sent) < len(pickle.dumps(trees)) / 3
     counted = counted_trees(pickle.loads(sent), demonstrations, **options)
     assert [tree.digest for tree in counted] == [tree.digest for tree in trees]
+
+
+@pytest.mark.parametrize("learner", ["exact", "histogram"])
+def test_any_whole_number_is_a_seed(learner):
+    steps = load_demonstrations("data/demonstrations/cartpole.parquet").select(range(4))
+    small, large = (
+        grow_policy_trees(steps, learner=learner, seed=seed)[0] for seed in (3, 2**32 + 3)
+    )
+    assert small.feature.tolist() == large.feature.tolist()
+    assert small.threshold.tolist() == large.threshold.tolist()

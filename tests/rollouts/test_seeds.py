@@ -63,6 +63,8 @@ def test_a_seed_that_no_file_could_hold_is_refused(agent: str) -> None:
     for seed, said in ((seeds.LARGEST_SEED + 1, "at most"), (10**20, "at most"), (-1, "at least")):
         with pytest.raises(InputError, match=f"seed is {seed} and must be {said}"):
             rollout(env_id, agent, episodes=2, seed=seed, max_steps=3)
+    with pytest.raises(InputError, match="seed is far too large"):
+        rollout(env_id, agent, episodes=2, seed=10**5_000)
     with pytest.raises(InputError, match="1,000,000,000 or fewer"):
         Plan(2, seed=seeds.LARGEST_RUN + 1)
     with pytest.raises(InputError, match="must be at most 1000000000"):

@@ -91,7 +91,7 @@ def amount_named(demonstrations: Demonstrations, name: str) -> int:
         InputError: If there is none of that name, or it says which word a column holds.
     """
     names = [feature.name for feature in demonstrations.observed]
-    known, (wanted,) = compared_names(names, (name.strip(),))
+    known, (wanted,) = compared_names(names, (name if name in names else name.strip(),))
     if wanted not in known:
         raise InputError(
             f"{quoted(name.strip())} is no feature that could be combined; the features are "

@@ -38,7 +38,9 @@ def exact_structure(
     """
     from sklearn.tree import DecisionTreeClassifier
 
-    learner = DecisionTreeClassifier(criterion="gini", max_depth=max_depth, random_state=seed)
+    learner = DecisionTreeClassifier(
+        criterion="gini", max_depth=max_depth, random_state=seed % 2**32
+    )
     return fitted(learner, observations, labels)
 
 
