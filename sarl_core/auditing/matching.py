@@ -20,6 +20,7 @@ from sarl_core.demonstrations.recoding import recoded
 from sarl_core.environments.feature_order import (
     NamedFeatures,
     compared_names,
+    is_several,
     line_up,
     only_counts,
     plain_names,
@@ -217,7 +218,7 @@ def _feature_places(
 
 def _have(called: str) -> str:
     """What is called so, and the verb."""
-    return f"{called} {'have' if called.endswith('s') else 'has'}"
+    return f"{called} {'have' if is_several(called) else 'has'}"
 
 
 def _naming(role: Literal["feature", "action"], lacking: Sequence[str]) -> str:

@@ -138,15 +138,10 @@ def audit(
         guards = [guard(text) for text in fail_on or ()]
         rule_set = RuleSet.load(rules)
         sign_off = sign_off_of(rule_set)
-        mined_from = (
-            None
-            if demonstrations is None
-            else read_demonstrations(
-                demonstrations, None, _said_of(demonstrations, columns), missing
-            )
-        )
-
-        if demonstrations is not None and mined_from is not None:
+        mined_from = None
+        if demonstrations is not None:
+            said = _said_of(demonstrations, columns)
+            mined_from = read_demonstrations(demonstrations, None, said, missing)
             with _naming(demonstrations):  # what does not fit in them is no fault of the log
                 matched_states(rule_set, mined_from, called="the demonstrations")
 

@@ -97,7 +97,7 @@ def require_labels(
         )
 
 
-def require_whole(
+def require_whole_labels(
     values: NDArray[Any], columns: Sequence[str], rows: NDArray[np.int64] | None = None
 ) -> None:
     """Refuse labels that are no whole numbers, or too large to be made such of 64 bits.

@@ -81,7 +81,7 @@ def line_up(first: NamedFeatures, second: NamedFeatures, *, what: str = "feature
         InputError: If there are not as many, or their names are of different things.
     """
     if len(first.names) != len(second.names):
-        several = [_SEVERAL.fullmatch(side.owner) is not None for side in (first, second)]
+        several = [is_several(side.owner) for side in (first, second)]
         asks = "ask about" if several[0] else "asks about"
         if what != "features":
             asks = "are for" if several[0] else "is for"
@@ -135,6 +135,15 @@ def line_up(first: NamedFeatures, second: NamedFeatures, *, what: str = "feature
         f"{first.owner} and {theirs!r} in {second.owner} ({shortened(first.names)}; "
         f"{shortened(second.names)}); give two of the same environment, or name them alike"
     )
+
+
+def is_several(owner: str) -> bool:
+    """Whether who is called so has, or have, something.
+
+    Args:
+        owner: As in `NamedFeatures`.
+    """
+    return _SEVERAL.fullmatch(owner) is not None
 
 
 def only_counts(names: Sequence[str]) -> bool:

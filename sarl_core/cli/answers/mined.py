@@ -33,10 +33,10 @@ def describe_mined(mined: MinedData, path: Path) -> dict[str, Any]:
                 "name": feature.name,
                 "unit": feature.unit,
                 "bins": len(one.counts),
-                "median": mined.median(index),
+                "median": median,
             }
-            for index, (feature, one) in enumerate(
-                zip(source.features, mined.histograms, strict=True)
+            for feature, one, median in zip(
+                source.features, mined.histograms, mined.medians, strict=True
             )
         ],
         "trees": [

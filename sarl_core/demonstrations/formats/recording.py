@@ -34,7 +34,7 @@ from sarl_core.demonstrations.requirements import (
     require_labels,
     require_length,
     require_order,
-    require_whole,
+    require_whole_labels,
     require_within,
     whole_numbers,
     whole_numbers_note,
@@ -516,7 +516,7 @@ def _labels(
         names, first, codes = described.label_names, described.label_first, ()
     columns = actions.reshape(len(actions), -1)
     require_finite(columns, recording.action_columns, recording.rows)
-    require_whole(columns, recording.action_columns, recording.rows)
+    require_whole_labels(columns, recording.action_columns, recording.rows)
     whole = columns.astype(np.int64)
     m = whole.shape[1]
     if names:

@@ -113,15 +113,9 @@ def counted_feature_rows(mined: MinedData) -> tuple[FeatureRow, ...]:
     """
     box = mined.boxes[0][:, 0]  # of the root
     return tuple(
-        FeatureRow(
-            feature.name,
-            feature.unit,
-            float(low),
-            mined.median(index),
-            float(high),
-        )
-        for index, (feature, low, high) in enumerate(
-            zip(mined.sample.features, box[0], box[3], strict=True)
+        FeatureRow(feature.name, feature.unit, float(low), median, float(high))
+        for feature, low, median, high in zip(
+            mined.sample.features, box[0], mined.medians, box[3], strict=True
         )
     )
 

@@ -135,13 +135,13 @@ class MinedData:
         """Number of episodes that were held out."""
         return len(self.held_out[0].numbers) if self.held_out else 0
 
-    def median(self, feature: int) -> float:
-        """That of a feature over all pairs, as `FeatureHistogram.median` has it.
-
-        Args:
-            feature: Its index.
-        """
-        return self.histograms[feature].median(self.sample.observations[:, feature])
+    @property
+    def medians(self) -> tuple[float, ...]:
+        """Of each feature over all pairs, as `FeatureHistogram.median` has it."""
+        columns = self.sample.observations.T
+        return tuple(
+            one.median(values) for one, values in zip(self.histograms, columns, strict=True)
+        )
 
     def renamed(self, sample: Demonstrations) -> MinedData:
         """The same under the names of its sample.

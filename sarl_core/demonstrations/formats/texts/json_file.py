@@ -17,7 +17,7 @@ from sarl_core.limits import require_memory
 
 _BLOCK = 2**14  # rows that are brought into their final form at once
 _MOST_LINE = 2**24  # bytes
-_DEEPEST = 6  # objects within one another
+_DEEPEST = 6  # objects, or lists, within one another
 _NUMBER = 8  # bytes
 
 _DECODER = msgspec.json.Decoder()
