@@ -18,7 +18,7 @@ from sarl_core.clusters import cluster
 from sarl_core.demonstrations.formats import read_demonstrations
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # its idle processes would take their share of all other tests
 def client() -> Iterator[Any]:
     with cluster("local:2") as client:
         yield client

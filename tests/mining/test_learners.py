@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import pickle
+from fractions import Fraction
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
 from sarl_core import (
     Demonstrations,
@@ -159,9 +161,69 @@ def test_of_a_billion_states_every_query_parts_some():
             for label in range(3):
                 shares = rng.dirichlet(np.ones(filled))
                 counts[feature, label, :filled] = rng.multinomial(total[label], shares)
-        query = histogram.best_query(counts)
+        (query,) = histogram.best_queries(counts[None])
         assert query is not None
         assert 0 < query.left.sum() < 1_000_000_000
+
+
+def test_queries_of_several_nodes_are_the_best_of_all_borders():
+    """Each border by hand: of a node with one bin, of nodes where none gains, and of others."""
+    rng = np.random.default_rng(0)
+    counts = rng.integers(0, 4, (60, 2, 3, 9)) * (rng.random((60, 1, 1, 9)) < 0.7)
+    counts[:, 1] = counts[:, 0, :, ::-1]  # the same states
+    counts[20:40] = counts[20:40, :, :1]  # no border tells the labels apart
+    counts[50, :, :, 1:] = 0
+    counts[50, :, :, 0] = 5
+    for node, query in zip(counts, histogram.best_queries(counts), strict=True):
+        purities = {}
+        for feature, border in np.ndindex(2, 8):
+            below = node[feature, :, : border + 1].sum(axis=1)
+            above = node[feature].sum(axis=1) - below
+            if below.sum() and above.sum():
+                purities[feature, border] = sum(
+                    Fraction(int((side**2).sum()), int(side.sum())) for side in (below, above)
+                )
+        if query is None:
+            assert not purities
+            continue
+        left = node[query.feature, :, : query.border + 1].sum(axis=1)
+        assert np.array_equal(query.left, left)
+        assert purities[query.feature, query.border] == max(purities.values())
+        first = min(key for key, one in purities.items() if one == max(purities.values()))
+        assert np.array_equal(left, node[first[0], :, : first[1] + 1].sum(axis=1))
+    assert histogram.best_queries(counts)[50] is None
+
+
+@pytest.mark.parametrize("min_support", [0.0, 0.01])
+def test_nodes_that_choose_their_queries_in_one_go_choose_as_each_alone(monkeypatch, min_support):
+    rng = np.random.default_rng(1)
+    states = rng.normal(size=(12_000, 5)).astype(np.float32)
+    states[:, 4] = states[:, 4] > 0
+    labels = (states[:, 0] * states[:, 1] + rng.normal(size=12_000) > 0).astype(int)
+    demonstrations = Demonstrations(states, labels, np.arange(12_000) // 100)
+
+    def grown():
+        (tree,) = grow_policy_trees(
+            demonstrations, learner="histogram", min_support=min_support, max_depth=14
+        )
+        return tree
+
+    together = grown()
+    monkeypatch.setattr(histogram, "_BINS_AT_ONCE", 1)
+    alone = grown()
+    assert together.n_nodes > 50
+    assert np.array_equal(together.feature, alone.feature)
+    assert np.array_equal(together.threshold, alone.threshold)
+    assert np.array_equal(together.counts, alone.counts)
+
+
+@given(
+    hnp.arrays(np.float32, st.integers(0, 60), elements=st.floats(width=32, allow_nan=False)),
+)
+def test_values_are_put_in_order_whatever_they_are(values):
+    order = histogram._ascending_order(values)
+    assert sorted(order.tolist()) == list(range(len(values)))
+    assert np.array_equal(values[order], np.sort(values))
 
 
 def test_one_label_alone_and_one_value_alone_are_one_leaf():

@@ -20,7 +20,7 @@ from sarl_core.mining.distributed.histograms import (
     Queries,
     added,
     at_root,
-    best_queries,
+    chosen_queries,
     grown_parts,
     histogram,
     joined,
@@ -138,7 +138,7 @@ class DistributedGrowth:
                 for rows, where in zip(self.rows, at, strict=True)
             ]
             total = added_up(self.client, parts)
-            chosen += self.client.submit(best_queries, total).result()
+            chosen += self.client.submit(chosen_queries, total).result()
         split: list[tuple[int, Query]] = []
         for number, query in zip(nodes, chosen, strict=True):
             if query is None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.growing.histogram import Query, best_query, binned_structure
+from sarl_core.mining.growing.histogram import Query, best_queries, binned_structure
 from sarl_core.mining.growing.structure import TreeStructure
 from sarl_core.mining.tree import LEAF
 
@@ -119,7 +119,7 @@ def added(*several: NDArray[np.int64]) -> NDArray[np.int64]:
     return total
 
 
-def best_queries(counts: NDArray[np.int64]) -> list[Query | None]:
+def chosen_queries(counts: NDArray[np.int64]) -> list[Query | None]:
     """The best query of each of k nodes; None where no border parts its rows.
 
     Args:
@@ -128,7 +128,8 @@ def best_queries(counts: NDArray[np.int64]) -> list[Query | None]:
     Returns:
         k entries.
     """
-    return [best_query(counts[:, node]) for node in range(counts.shape[1])]
+    # One at a time, for its sums take several times the room of the counts.
+    return [best_queries(counts[None, :, node])[0] for node in range(counts.shape[1])]
 
 
 def taken(

@@ -3,9 +3,10 @@
 A feature's values become the numbers of bins that hold about as many states each. At a node, states
 are counted by feature, label and bin, which says at once what every border between two bins would
 part; of the two nodes below, the larger one has what the smaller one has not. Few states have no
-use for a thousand bins, so neighbouring ones are taken together, and where very few are left,
-sorting them is faster than counting. With fewer values than bins every border between two of them
-is one. What is between two bins is a threshold of the states, so the tree asks about those.
+use for a thousand bins, so neighbouring ones are taken together, several such nodes choose their
+queries in one go, and where very few states are left, sorting them is faster than counting. With
+fewer values than bins every border between two of them is one. What is between two bins is a
+threshold of the states, so the tree asks about those.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ _STATES_A_BIN = 4  # of a node, at least, before neighbouring bins are taken tog
 _SORTED = 500  # states that are sorted rather than counted, where many nodes are to come of them
 _MANY_NODES = 8
 _WAITING = 64  # parts at most that are sorted, or wait for it, or to be taken
+_BINS_AT_ONCE = 512  # of a feature, of all nodes whose queries are chosen in one go
 _AT_ONCE = 6_000  # states whose features are counted in one go: of more, they fill the cache
 
 
@@ -63,10 +65,11 @@ class BinnedStates:
         numbers = np.empty(observations.shape[::-1], dtype=np.uint16)
 
         def bin_feature(index: int) -> NDArray[np.float64]:
+            values = observations[:, index].copy()  # of which the rest is faster
             # A formula may be infinite, and thresholds lie below the limit; NaN is at most none.
-            values = np.fmax(np.fmin(observations[:, index], LARGEST), -LARGEST)
+            np.fmax(np.fmin(values, LARGEST, out=values), -LARGEST, out=values)
             # Much faster than to search the bin of each value.
-            order = np.argsort(values)
+            order = _ascending_order(values)
             ascending = values[order]
             ends = _bin_ends(ascending)
             sizes = np.diff(ends, prepend=0, append=len(values))
@@ -98,44 +101,52 @@ class Query(NamedTuple):
     left: NDArray[np.int64]
 
 
-def best_query(counts: NDArray[np.int64]) -> Query | None:
-    """Choose a query, as CART does by Gini's impurity; of equals the first feature and border.
+def best_queries(counts: NDArray[np.int64]) -> list[Query | None]:
+    """Choose queries, as CART does by Gini's impurity; of equals the first feature and border.
 
     Which are equal is told exactly up to ninety million states.
 
     Args:
-        counts: States of a node by feature, label and bin, (d, labels, bins).
+        counts: States of k nodes by feature, label and bin, (k, d, labels, bins).
 
     Returns:
-        None where no border parts them.
+        k entries; None where no border parts a node's states.
     """
-    bins = counts.shape[2]
+    k, _, _, bins = counts.shape
     if bins < 2:
-        return None
-    total = counts[0].sum(axis=1).astype(np.float64)
+        return [None] * k
+    total = counts[:, 0].sum(axis=2).astype(np.float64)
     # Whole numbers are added up faster.
-    below = counts[:, :, :-1].cumsum(axis=2).astype(np.float64)
-    n_below = below.sum(axis=1)
-    n_above = total.sum() - n_below
+    below = counts[..., :-1].cumsum(axis=3).astype(np.float64)
+    n_below = below.sum(axis=2)
+    n_above = total.sum(axis=1)[:, None, None] - n_below
     # The impurity that is left is the number of states less this. The squares of what is above
     # are those of all and of what is below, less twice their product.
-    squares = np.einsum("dlb,dlb->db", below, below)
-    above = np.einsum("l,dlb->db", -2.0 * total, below)
-    above += squares
-    above += total @ total
-    nothing = (n_below == 0) | (n_above == 0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        squares /= n_below
-        above /= n_above
-    purity = np.add(above, squares, out=above)
-    purity[nothing] = -1.0
-    feature, first = divmod(int(purity.argmax()), bins - 1)
-    if purity[feature, first] < 0.0:
-        return None
+    squares = np.einsum("kdlb,kdlb->kdb", below, below)
+    purity = np.einsum("kl,kdlb->kdb", -2.0 * total, below)
+    purity += squares
+    purity += np.square(total).sum(axis=1)[:, None, None]
+    purity /= np.maximum(n_above, 1.0)
+    squares /= np.maximum(n_below, 1.0)
+    purity += squares
+    nodes = np.arange(k)
+
+    def chosen() -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return np.divmod(purity.reshape(k, -1).argmax(axis=1), bins - 1)
+
+    feature, first = chosen()
+    # A border with nothing on one side is as good as no query, and so is the best where no query
+    # gains: then the others alone are looked at, which takes longer.
+    if not (n_below[nodes, feature, first] * n_above[nodes, feature, first]).all():
+        purity[(n_below == 0) | (n_above == 0)] = -1.0
+        feature, first = chosen()
     # Between two bins that hold states there may be empty ones: the border is in their middle.
-    last = int(np.searchsorted(n_below[feature], n_below[feature, first], side="right")) - 1
-    left = below[feature, :, first].astype(np.int64)
-    return Query(feature, (first + last) // 2, left)
+    n_left = n_below[nodes, feature, first]
+    last = (n_below[nodes, feature] <= n_left[:, None]).sum(axis=1) - 1
+    left = below[nodes, feature, :, first].astype(np.int64)
+    queries = map(Query, feature.tolist(), ((first + last) // 2).tolist(), left)
+    parts = purity[nodes, feature, first] >= 0.0
+    return [query if is_one else None for query, is_one in zip(queries, parts, strict=True)]
 
 
 def histogram_structure(
@@ -210,8 +221,7 @@ def binned_structure(
         return growth.grow(waiting, len(labels))
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
+class _Part(NamedTuple):
     """The states of a node that may be split.
 
     Attributes:
@@ -275,24 +285,34 @@ class _Growth:
         sorted_parts: deque[
             tuple[int, NDArray[np.signedinteger], Future[tuple[TreeStructure, NDArray[np.int64]]]]
         ] = deque()
+        counted_parts: dict[int, list[_Part]] = {}  # by the number of bins
 
         def take() -> None:
             node, rows, future = sorted_parts.popleft()
             self._take(node, rows, *future.result(), leaves)
 
-        while waiting:
-            part = waiting.pop()
-            if not self._is_split(part):
-                leaves[part.rows] = part.node
-            elif self.least * _MANY_NODES <= len(part.rows) <= _SORTED:
-                future = self.threads.submit(self._sorted, replace(part, counts=None))
-                sorted_parts.append((part.node, part.rows, future))
-                if len(sorted_parts) > _WAITING:
-                    take()
-            elif below := self._split(part):
-                waiting += below
-            else:
-                leaves[part.rows] = part.node
+        while waiting or counted_parts:
+            while waiting:
+                part = waiting.pop()
+                if not self._is_split(part):
+                    leaves[part.rows] = part.node
+                elif self.least * _MANY_NODES <= len(part.rows) <= _SORTED:
+                    future = self.threads.submit(self._sorted, part._replace(counts=None))
+                    sorted_parts.append((part.node, part.rows, future))
+                    if len(sorted_parts) > _WAITING:
+                        take()
+                else:
+                    counted_parts.setdefault(_bins_for(len(part.rows)), []).append(part)
+                del part  # its states may be most of what there is
+            if counted_parts:
+                bins, parts = _taken_together(counted_parts)
+                waiting, whole = self._split(parts, bins)
+                for part in whole:
+                    if bins < BINS:  # it may be that neighbouring bins are what is to be parted
+                        counted_parts.setdefault(BINS, []).append(part)
+                    else:
+                        leaves[part.rows] = part.node
+                del parts, whole
         while sorted_parts:
             take()
         return self._in_order(leaves)
@@ -302,25 +322,31 @@ class _Growth:
         pure = n in part.of_labels.tolist()
         return n >= self.least and part.depth != self.max_depth and not pure
 
-    def _split(self, part: _Part) -> list[_Part]:
-        """Choose a query and make two nodes; none where no border parts the states."""
-        bins = BINS
-        while bins > _FEWEST_BINS and bins * _STATES_A_BIN > len(part.rows):
-            bins //= 2
-        counts = self._counted(part, bins)
-        query = best_query(counts)
-        if query is None and bins < BINS:
-            bins = BINS
-            counts = self._counted(replace(part, counts=None), bins)
-            query = best_query(counts)
-        if query is None:
-            return []
+    def _split(self, parts: list[_Part], bins: int) -> tuple[list[_Part], list[_Part]]:
+        """Choose queries and make two nodes of each part; and the parts that no border parts."""
+        counts = self._counted(parts, bins)
+        below, whole = [], []
+        for part, of_part, query in zip(parts, counts, best_queries(counts), strict=True):
+            if query is None:
+                whole.append(part._replace(counts=None))
+                continue
+            two = self._parted(part, query, BINS // bins)
+            # Of fewer, counting is as fast; and what waits should not take more than its states.
+            if max(len(one.rows) for one in two) > max(_AT_ONCE, self.labels * BINS):
+                smaller, larger = sorted(two, key=lambda one: len(one.rows))
+                few = self._counted([smaller], bins)[0]
+                two = [smaller._replace(counts=few), larger._replace(counts=of_part - few)]
+            below += two
+        return below, whole
+
+    def _parted(self, part: _Part, query: Query, together: int) -> list[_Part]:
+        """Two nodes of one, of whose bins so many were taken together."""
         # The last of the bins that were taken together, and of those that were spread.
-        border = (query.border + 1) * (BINS // bins) - 1
+        border = (query.border + 1) * together - 1
         goes_left = part.keys[query.feature] & (BINS - 1) <= border
         self.feature[part.node] = query.feature
         self.border[part.node] = border >> int(self.spread[query.feature])
-        below = []
+        two = []
         for side, inside, of_labels in (
             (self.left, goes_left, query.left),
             (self.right, ~goes_left, part.of_labels - query.left),
@@ -330,40 +356,30 @@ class _Growth:
             self.border.append(0.0)
             self.left.append(LEAF)
             self.right.append(LEAF)
-            some = np.flatnonzero(inside)
-            below.append(
-                _Part(
-                    side[part.node],
-                    part.depth + 1,
-                    of_labels,
-                    part.rows[some],
-                    part.keys.take(some, axis=1),
-                )
-            )
-        smaller, larger = sorted(below, key=lambda one: len(one.rows))
-        # Of fewer, counting is as fast; and what waits should not take more than its states do.
-        if len(larger.rows) > max(_AT_ONCE, self.labels * BINS):
-            few = self._counted(smaller, bins)
-            below = [replace(smaller, counts=few), replace(larger, counts=counts - few)]
-        return below
+            (some,) = inside.nonzero()
+            rows, keys = part.rows[some], part.keys.take(some, axis=1)
+            two.append(_Part(side[part.node], part.depth + 1, of_labels, rows, keys))
+        return two
 
-    def _counted(self, part: _Part, bins: int) -> NDArray[np.int64]:
-        """The states of a node by feature, label and bin, (d, labels, bins)."""
-        d, n = part.keys.shape
-        if part.counts is not None:
-            together = part.counts.shape[2] // bins
-            if together == 1:
-                return part.counts
-            return np.asarray(part.counts.reshape(d, self.labels, bins, together).sum(axis=3))
+    def _counted(self, parts: list[_Part], bins: int) -> NDArray[np.int64]:
+        """The states of k nodes by feature, label and bin, (k, d, labels, bins)."""
+        k, d = len(parts), len(self.spread)
+        shape = (k, d, self.labels, bins)
+        known = parts[0].counts
+        if k == 1 and known is not None:
+            return np.asarray(known.reshape(*shape, -1).sum(axis=4))
         size = self.labels * bins
-        keys = part.keys if bins == BINS else part.keys >> (BINS // bins).bit_length() - 1
-        if n > _AT_ONCE:
+        keys = np.concatenate([part.keys for part in parts], axis=1) if k > 1 else parts[0].keys
+        if bins < BINS:
+            keys = keys >> (BINS // bins).bit_length() - 1
+        if k == 1 and keys.shape[1] > _AT_ONCE:
             counts = np.stack([np.bincount(column, minlength=size) for column in keys])
         else:
             places = keys.astype(np.int64)
             places += (np.arange(d) * size)[:, None]
-            counts = np.bincount(places.reshape(-1), minlength=d * size)
-        return np.asarray(counts.reshape(d, self.labels, bins))
+            places += np.repeat(d * size * np.arange(k), [len(part.rows) for part in parts])
+            counts = np.bincount(places.reshape(-1), minlength=k * d * size)
+        return np.asarray(counts.reshape(shape))
 
     def _sorted(self, part: _Part) -> tuple[TreeStructure, NDArray[np.int64]]:
         """What stands below a node of few states, and the leaf of each."""
@@ -434,6 +450,40 @@ class _Growth:
             children(right),
         )
         return structure, place[leaves]
+
+
+def _bins_for(n: int) -> int:
+    """How many bins of a feature are told apart at a node of n states."""
+    bins = BINS
+    while bins > _FEWEST_BINS and bins * _STATES_A_BIN > n:
+        bins //= 2
+    return bins
+
+
+def _taken_together(counted_parts: dict[int, list[_Part]]) -> tuple[int, list[_Part]]:
+    """Take parts of one number of bins, and that number: few bins first, where there are enough."""
+    enough = [bins for bins, parts in counted_parts.items() if len(parts) * bins >= _BINS_AT_ONCE]
+    bins = min(enough, default=max(counted_parts))
+    parts = counted_parts[bins]
+    taken = parts[-max(1, _BINS_AT_ONCE // bins) :]
+    del parts[-len(taken) :]
+    if not parts:
+        del counted_parts[bins]
+    return bins, taken
+
+
+def _ascending_order(values: NDArray[np.float32]) -> NDArray[np.int64]:
+    """What sorts N values, of which equal ones may stand in any order, and none is NaN.
+
+    As `argsort`, at half its time: a number that holds a value above its place is sorted as such.
+    """
+    bits = (values + np.float32(0)).view(np.int32)  # of two zeros one
+    bits ^= (bits >> 31) & 0x7FFFFFFF  # as whole numbers, those below zero would run backwards
+    both = np.left_shift(bits, 32, dtype=np.int64)
+    both |= np.arange(len(values))
+    both.sort()
+    both &= 0xFFFFFFFF
+    return both
 
 
 def _bin_ends(ascending: NDArray[np.float32]) -> NDArray[np.int64]:

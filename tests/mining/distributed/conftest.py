@@ -19,7 +19,7 @@ from sarl_core.mining.distributed.pieces import Reading, parquet_paths
 Mine = Callable[..., MinedData]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")  # its idle processes would take their share of all other tests
 def client() -> Iterator[Any]:
     with cluster("local:2") as client:
         yield client
