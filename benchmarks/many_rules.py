@@ -38,12 +38,14 @@ def rules() -> RuleSet:
 
 def many_rules(quick: bool) -> Iterable[Row]:
     """A page of the table, a search, and every file that Export offers but ONNX."""
+    from streamlit.logger import set_log_level
+
     from sarl_dashboard.components.lists.rule_search import have_word
     from sarl_dashboard.views.export.files import file_of
     from sarl_dashboard.views.export.settings import FORMATS
     from sarl_dashboard.views.rules.listing import listed_rules, table_of
 
-    logging.getLogger("streamlit").setLevel(logging.ERROR)  # it misses a page to say things on
+    set_log_level(logging.ERROR)  # it misses a page to say things on
     rule_set = rules()
     count, words = f"{len(rule_set):,} rules", iter(range(FEATURES))
 

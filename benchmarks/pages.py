@@ -80,13 +80,13 @@ def edit(quick: bool) -> Iterable[Row]:
 
 
 def difference(quick: bool) -> Iterable[Row]:
-    """Another second set."""
+    """Another of three sets beside the rules in force."""
     yield from _rows(
         quick,
         Control(
-            "Difference, another second set",
-            "difference",
-            partial(_option, label="Second set", options=("compact", "unfiltered")),
+            "Compare, another set to look at closely",
+            "compare?sets=in force|unfiltered|compact",
+            partial(_option, label="in force against", options=("compact", "unfiltered")),
             (".st-key-confusion", TABLES),
         ),
     )
