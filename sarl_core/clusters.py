@@ -6,11 +6,12 @@ also uses the client itself, which keeps what was worked out where it was worked
 
 from __future__ import annotations
 
+import asyncio
 import atexit
 import logging
 import re
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from typing import Any, ParamSpec, TypeVar
@@ -138,6 +139,9 @@ def cluster(address: str) -> Iterator[Any]:
             yield client
         return
     try:
+        # Of its own thread, for whoever calls from a loop that runs.
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(asyncio.run, _reach(address)).result()
         client = Client(address, timeout=_SECONDS)
     except (OSError, ValueError) as error:
         raise InputError(
@@ -146,6 +150,20 @@ def cluster(address: str) -> Iterator[Any]:
     with client:
         _require_same_package(client, address)
         yield client
+
+
+async def _reach(address: str) -> None:
+    """Fail where no scheduler answers in time: a client waits for good where another server is."""
+    from distributed import Security, rpc
+
+    arguments = Security().get_connection_args("client")
+    if address.startswith("tls://") and arguments["ssl_context"] is None:
+        raise InputError(
+            f"{quoted(address)} asks for TLS, and no certificate is known here; name yours in "
+            "Dask's configuration, under distributed.comm.tls"
+        )
+    async with asyncio.timeout(_SECONDS), rpc(address, connection_args=arguments) as scheduler:
+        await scheduler.identity()
 
 
 def _begun() -> int:

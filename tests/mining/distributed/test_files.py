@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from pathlib import Path
 from typing import Any
 
@@ -206,6 +207,7 @@ def test_held_out_episodes_with_nearly_all_steps_are_refused(tmp_path: Path, min
             "the processes of 'local:1:150MB' do not start",
         ),
         ("tcp://127.0.0.1:9", "no scheduler answers at 'tcp://127.0.0.1:9'; check the address"),
+        ("tls://127.0.0.1:9", "'tls://127.0.0.1:9' asks for TLS, and no certificate is known here"),
     ],
 )
 def test_clusters_that_are_none(
@@ -215,6 +217,15 @@ def test_clusters_that_are_none(
     monkeypatch.setattr("sarl_core.clusters._START_SECONDS", 10)
     with pytest.raises(InputError, match=sentence), cluster(address):
         pass
+
+
+def test_a_server_that_is_no_scheduler_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As that of a scheduler's own pages, at the port after its own."""
+    monkeypatch.setattr("sarl_core.clusters._SECONDS", 1)
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(InputError, match=f"no scheduler answers at '{address}'"):
+            cluster(address).__enter__()
 
 
 def test_workers_of_another_version(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
