@@ -11,9 +11,10 @@ import atexit
 import logging
 import re
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
 from importlib import import_module
+from threading import Thread
 from typing import Any, ParamSpec, TypeVar
 
 from sarl_core.errors import InputError, WorkError, needing_extras, quoted
@@ -138,23 +139,19 @@ def cluster(address: str) -> Iterator[Any]:
             _require_start(client, int(local["workers"]), address)
             yield client
         return
+    _require_scheduler(address)
     try:
-        # Of its own thread, for whoever calls from a loop that runs.
-        with ThreadPoolExecutor(1) as thread:
-            thread.submit(asyncio.run, _reach(address)).result()
         client = Client(address, timeout=_SECONDS)
     except (OSError, ValueError) as error:
-        raise InputError(
-            f"no scheduler answers at {quoted(address)}; check the address, and that it runs"
-        ) from error
+        raise _no_scheduler(address) from error
     with client:
         _require_same_package(client, address)
         yield client
 
 
-async def _reach(address: str) -> None:
-    """Fail where no scheduler answers in time: a client waits for good where another server is."""
-    from distributed import Security, rpc
+def _require_scheduler(address: str) -> None:
+    """Refuse an address at which nobody answers, or another server than a scheduler."""
+    from distributed import Security
 
     arguments = Security().get_connection_args("client")
     if address.startswith("tls://") and arguments["ssl_context"] is None:
@@ -162,8 +159,36 @@ async def _reach(address: str) -> None:
             f"{quoted(address)} asks for TLS, and no certificate is known here; name yours in "
             "Dask's configuration, under distributed.comm.tls"
         )
-    async with asyncio.timeout(_SECONDS), rpc(address, connection_args=arguments) as scheduler:
-        await scheduler.identity()
+    answer: Future[bool] = Future()
+
+    def ask() -> None:
+        try:
+            answer.set_result(asyncio.run(_is_scheduler(address, arguments)))
+        except Exception as error:  # whatever can be made of what another server says
+            answer.set_exception(error)
+
+    # Of its own thread, for whoever calls from a loop that runs; and whose end nobody waits for.
+    Thread(target=ask, daemon=True).start()
+    try:
+        answers = answer.result(_SECONDS)
+    except Exception as error:
+        raise _no_scheduler(address) from error
+    if not answers:
+        raise _no_scheduler(address)
+
+
+async def _is_scheduler(address: str, arguments: dict[str, Any]) -> bool:
+    from distributed import rpc
+
+    # A client would wait for good where another server says nothing.
+    async with asyncio.timeout(_SECONDS), rpc(address, connection_args=arguments) as server:
+        return "workers" in await server.identity()
+
+
+def _no_scheduler(address: str) -> InputError:
+    return InputError(
+        f"no scheduler answers at {quoted(address)}; check the address, and that it runs"
+    )
 
 
 def _begun() -> int:

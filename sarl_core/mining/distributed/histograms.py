@@ -128,7 +128,7 @@ def chosen_queries(counts: NDArray[np.int64]) -> list[Query | None]:
     Returns:
         k entries.
     """
-    # One at a time, for its sums take several times the room of the counts.
+    # One node at a time: the sums of all of them would take several times the room of the counts.
     return [best_queries(counts[None, :, node])[0] for node in range(counts.shape[1])]
 
 

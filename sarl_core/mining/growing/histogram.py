@@ -33,7 +33,8 @@ _STATES_A_BIN = 4  # of a node, at least, before neighbouring bins are taken tog
 _SORTED = 500  # states that are sorted rather than counted, where many nodes are to come of them
 _MANY_NODES = 8
 _WAITING = 64  # parts at most that are sorted, or wait for it, or to be taken
-_BINS_AT_ONCE = 512  # of a feature, of all nodes whose queries are chosen in one go
+_BINS_IN_ONE_GO = 512  # of a feature, of all nodes that choose their queries together, at most
+_COUNTS_IN_ONE_GO = 200_000  # of all features and labels, likewise: more fill the cache
 _AT_ONCE = 6_000  # states whose features are counted in one go: of more, they fill the cache
 
 
@@ -65,7 +66,7 @@ class BinnedStates:
         numbers = np.empty(observations.shape[::-1], dtype=np.uint16)
 
         def bin_feature(index: int) -> NDArray[np.float64]:
-            values = observations[:, index].copy()  # of which the rest is faster
+            values = observations[:, index].copy()  # side by side: the rest is faster
             # A formula may be infinite, and thresholds lie below the limit; NaN is at most none.
             np.fmax(np.fmin(values, LARGEST, out=values), -LARGEST, out=values)
             # Much faster than to search the bin of each value.
@@ -104,7 +105,7 @@ class Query(NamedTuple):
 def best_queries(counts: NDArray[np.int64]) -> list[Query | None]:
     """Choose queries, as CART does by Gini's impurity; of equals the first feature and border.
 
-    Which are equal is told exactly up to ninety million states.
+    Equal is what is so when rounded; of up to ninety million states, only quotients are.
 
     Args:
         counts: States of k nodes by feature, label and bin, (k, d, labels, bins).
@@ -145,8 +146,8 @@ def best_queries(counts: NDArray[np.int64]) -> list[Query | None]:
     last = (n_below[nodes, feature] <= n_left[:, None]).sum(axis=1) - 1
     left = below[nodes, feature, :, first].astype(np.int64)
     queries = map(Query, feature.tolist(), ((first + last) // 2).tolist(), left)
-    parts = purity[nodes, feature, first] >= 0.0
-    return [query if is_one else None for query, is_one in zip(queries, parts, strict=True)]
+    is_query = purity[nodes, feature, first] >= 0.0
+    return [query if is_one else None for query, is_one in zip(queries, is_query, strict=True)]
 
 
 def histogram_structure(
@@ -305,17 +306,39 @@ class _Growth:
                     counted_parts.setdefault(_bins_for(len(part.rows)), []).append(part)
                 del part  # its states may be most of what there is
             if counted_parts:
-                bins, parts = _taken_together(counted_parts)
+                bins, parts = self._next_parts(counted_parts)
                 waiting, whole = self._split(parts, bins)
-                for part in whole:
+                del parts
+                while whole:
+                    part = whole.pop()
                     if bins < BINS:  # it may be that neighbouring bins are what is to be parted
                         counted_parts.setdefault(BINS, []).append(part)
                     else:
                         leaves[part.rows] = part.node
-                del parts, whole
+                    del part
         while sorted_parts:
             take()
         return self._in_order(leaves)
+
+    def _next_parts(self, counted_parts: dict[int, list[_Part]]) -> tuple[int, list[_Part]]:
+        """Take parts of one number of bins, and that number.
+
+        As few bins as there are enough parts of, so that what waits stays small; where there are
+        enough of none the most, since what comes of those joins the others.
+        """
+
+        def most(bins: int) -> int:
+            size = len(self.spread) * self.labels * bins
+            return max(1, min(_BINS_IN_ONE_GO // bins, _COUNTS_IN_ONE_GO // size))
+
+        enough = [bins for bins, parts in counted_parts.items() if len(parts) >= most(bins)]
+        bins = min(enough, default=max(counted_parts))
+        parts = counted_parts[bins]
+        taken = parts[-most(bins) :]
+        del parts[-len(taken) :]
+        if not parts:
+            del counted_parts[bins]
+        return bins, taken
 
     def _is_split(self, part: _Part) -> bool:
         n = len(part.rows)
@@ -335,7 +358,9 @@ class _Growth:
             if max(len(one.rows) for one in two) > max(_AT_ONCE, self.labels * BINS):
                 smaller, larger = sorted(two, key=lambda one: len(one.rows))
                 few = self._counted([smaller], bins)[0]
-                two = [smaller._replace(counts=few), larger._replace(counts=of_part - few)]
+                if _bins_for(len(smaller.rows)) == BINS:
+                    smaller = smaller._replace(counts=few)
+                two = [smaller, larger._replace(counts=of_part - few)]
             below += two
         return below, whole
 
@@ -367,7 +392,8 @@ class _Growth:
         shape = (k, d, self.labels, bins)
         known = parts[0].counts
         if k == 1 and known is not None:
-            return np.asarray(known.reshape(*shape, -1).sum(axis=4))
+            same = known.shape[2] == bins
+            return known[None] if same else np.asarray(known.reshape(*shape, -1).sum(axis=4))
         size = self.labels * bins
         keys = np.concatenate([part.keys for part in parts], axis=1) if k > 1 else parts[0].keys
         if bins < BINS:
@@ -458,18 +484,6 @@ def _bins_for(n: int) -> int:
     while bins > _FEWEST_BINS and bins * _STATES_A_BIN > n:
         bins //= 2
     return bins
-
-
-def _taken_together(counted_parts: dict[int, list[_Part]]) -> tuple[int, list[_Part]]:
-    """Take parts of one number of bins, and that number: few bins first, where there are enough."""
-    enough = [bins for bins, parts in counted_parts.items() if len(parts) * bins >= _BINS_AT_ONCE]
-    bins = min(enough, default=max(counted_parts))
-    parts = counted_parts[bins]
-    taken = parts[-max(1, _BINS_AT_ONCE // bins) :]
-    del parts[-len(taken) :]
-    if not parts:
-        del counted_parts[bins]
-    return bins, taken
 
 
 def _ascending_order(values: NDArray[np.float32]) -> NDArray[np.int64]:

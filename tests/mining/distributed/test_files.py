@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import socket
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import dask
@@ -219,13 +220,33 @@ def test_clusters_that_are_none(
         pass
 
 
-def test_a_server_that_is_no_scheduler_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("says", [b"", b"HTTP/1.1 400 Bad Request\r\n\r\n"])
+def test_a_server_that_is_no_scheduler_is_not_waited_for(
+    says: bytes, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """As that of a scheduler's own pages, at the port after its own."""
     monkeypatch.setattr("sarl_core.clusters._SECONDS", 1)
-    with socket.create_server(("127.0.0.1", 0)) as silent:
-        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer() -> None:
+            other, _ = server.accept()
+            with other:
+                other.sendall(says)
+                while other.recv(4096):  # until the other side has gone
+                    pass
+
+        answering = Thread(target=answer)
+        answering.start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with pytest.raises(InputError, match=f"no scheduler answers at '{address}'"):
             cluster(address).__enter__()
+        answering.join()
+
+
+def test_a_worker_is_no_scheduler(client: Any) -> None:
+    worker = next(iter(client.scheduler_info()["workers"]))
+    with pytest.raises(InputError, match=f"no scheduler answers at '{worker}'"):
+        cluster(worker).__enter__()
 
 
 def test_workers_of_another_version(client: Any, monkeypatch: pytest.MonkeyPatch) -> None:
