@@ -105,7 +105,8 @@ class Query(NamedTuple):
 def best_queries(counts: NDArray[np.int64]) -> list[Query | None]:
     """Choose queries, as CART does by Gini's impurity; of equals the first feature and border.
 
-    Equal is what is so when rounded; of up to ninety million states, only quotients are.
+    Equal are purities that round to one number; up to ninety million states nothing but their
+    quotients is rounded.
 
     Args:
         counts: States of k nodes by feature, label and bin, (k, d, labels, bins).

@@ -226,6 +226,7 @@ def test_a_server_that_is_no_scheduler_is_not_waited_for(
 ) -> None:
     """As that of a scheduler's own pages, at the port after its own."""
     monkeypatch.setattr("sarl_core.clusters._SECONDS", 1)
+    monkeypatch.setattr("distributed.Client", None)  # would wait without end
     with socket.create_server(("127.0.0.1", 0)) as server:
 
         def answer() -> None:
@@ -235,7 +236,7 @@ def test_a_server_that_is_no_scheduler_is_not_waited_for(
                 while other.recv(4096):  # until the other side has gone
                     pass
 
-        answering = Thread(target=answer)
+        answering = Thread(target=answer, daemon=True)
         answering.start()
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with pytest.raises(InputError, match=f"no scheduler answers at '{address}'"):
