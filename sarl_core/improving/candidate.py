@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.agents.agent import Agent
+from sarl_core.agents.agent import Agent, EpisodicAgent, PlacedAgent
+from sarl_core.agents.spaces import Actions, SpaceAdapter
 from sarl_core.demonstrations.dataset import Demonstrations, derived_features
 from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.environments.environment import EnvironmentOrId
@@ -17,14 +20,16 @@ from sarl_core.mining.budgeted_trees import leaf_rules, without_idle_queries
 from sarl_core.mining.combining.queries import over_queried
 from sarl_core.mining.growing.structure import TreeStructure, count_tree
 from sarl_core.mining.tree import LEAF, PolicyTree
-from sarl_core.processes import run_each
-from sarl_core.progress import Progress
+from sarl_core.processes import run_each, workers_of
+from sarl_core.progress import Progress, report
 from sarl_core.rollouts.choices import weighed
-from sarl_core.rollouts.episodes import LOST, rollout
+from sarl_core.rollouts.episodes import LOST, run_seeds
+from sarl_core.rollouts.player import check_environment
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
 
 _FEW = 2_000  # rows that tell a shield nothing but that its rules exist
+_ABREAST = 32  # episodes: more brings nothing
 
 
 @dataclass(frozen=True)
@@ -151,33 +156,131 @@ class Evaluator:
             CancelledError: If `progress` returned False.
         """
         few = _first_of(pairs, _FEW)
-        tasks = [(self, candidate, few, seed, episodes) for candidate in candidates]
-        return run_each(episode_scores, tasks, lost=LOST, executor=workers, progress=progress)
+        many = 1 if workers is None else workers_of(workers)
+        most = min(-(-len(candidates) // many), max(_ABREAST // episodes, 1))
+        tasks = [
+            (self, candidates[at : at + most], few, seed, episodes)
+            for at in range(0, len(candidates), most)
+        ]
+        done = 0
+
+        def finished(count: int = 1) -> None:
+            nonlocal done
+            done += count
+            report(progress, min(done // episodes, len(candidates)), len(candidates))
+
+        finished(0)
+        if workers is None:
+            results = [episode_scores(*task, finished=finished) for task in tasks]
+        else:
+            results = run_each(
+                episode_scores,
+                tasks,
+                lost=LOST,
+                executor=workers,
+                progress=lambda tasks_done, _: finished(tasks_done * most * episodes - done),
+            )
+        return [scores for result in results for scores in result]
+
+
+class ShieldedAgent:
+    """An agent whose actions one of several shields checks, depending on the episode.
+
+    A step of many environments costs little more than one of few, so that several rule sets are
+    sooner tried side by side. Each decides as it would alone.
+    """
+
+    def __init__(
+        self, agent: Agent, shields: Sequence[Shield], episodes: int, adapter: SpaceAdapter
+    ) -> None:
+        """Begin.
+
+        Args:
+            agent: Who is shielded; not an `EpisodicAgent`.
+            shields: K of them, for the environment as it is.
+            episodes: For each, E; the first shield checks the first E episodes, and so on.
+            adapter: Of the environment.
+        """
+        self.name, self.n_uniforms = agent.name, agent.n_uniforms
+        self._agent, self._shields, self._episodes = agent, shields, episodes
+        self._adapter = adapter
+        # To look at every step takes a part of its time.
+        self._placed = agent if isinstance(agent, PlacedAgent) else None
+        self._checking: list[Shield] = []
+
+    def place(self, episodes: NDArray[np.int64], steps: NDArray[np.int64]) -> None:
+        """Say where the states lie that it is asked about next.
+
+        Args:
+            episodes: Index of the episode of each, (B,).
+            steps: Steps of the episode so far, (B,).
+        """
+        self._checking = [self._shields[one] for one in (episodes // self._episodes).tolist()]
+        if self._placed is not None:
+            self._placed.place(episodes % self._episodes, steps)
+
+    def act(
+        self, observations: NDArray[np.float32], uniforms: NDArray[np.float64] | None
+    ) -> Actions:
+        """Choose actions, and replace those that break a rule.
+
+        Args:
+            observations: Shape (B, d), float32.
+            uniforms: As the agent needs them.
+
+        Returns:
+            Actions with one column a dimension.
+        """
+        proposed = self._agent.act(observations, uniforms)
+        actions = self._adapter.shaped(proposed)
+        executed: Any = np.array(
+            [
+                shield.decision_fields(state, action)[0]
+                for shield, state, action in zip(self._checking, observations, actions, strict=True)
+            ]
+        )
+        return self._adapter.columns(executed.astype(proposed.dtype))
 
 
 def episode_scores(
-    evaluator: Evaluator, candidate: Candidate, few: Demonstrations, seed: int, episodes: int
-) -> NDArray[np.float64]:
-    """What one candidate achieves, (E,).
+    evaluator: Evaluator,
+    candidates: Sequence[Candidate],
+    few: Demonstrations,
+    seed: int,
+    episodes: int,
+    *,
+    finished: Callable[[], None] | None = None,
+) -> list[NDArray[np.float64]]:
+    """What each candidate achieves, K times (E,).
 
     Args:
-        evaluator: How it is tried.
-        candidate: The trees.
+        evaluator: How they are tried.
+        candidates: K times the trees.
         few: Pairs that rules can be counted over.
-        seed: Of the first episode.
-        episodes: How many.
+        seed: Of the first episode, the same for all.
+        episodes: How many for each, E.
+        finished: Called after every episode; may raise to stop.
     """
-    rules = leaf_rules(candidate.trees(few, evaluator.divider))
-    played = rollout(
+    shields = [
+        Shield(leaf_rules(candidate.trees(few, evaluator.divider)), projection=evaluator.projection)
+        for candidate in candidates
+    ]
+    seeds = np.arange(seed, seed + episodes, dtype=np.int64)
+    run = partial(
+        run_seeds,
         evaluator.env_id,
-        evaluator.agent,
-        shield=Shield(rules, projection=evaluator.projection),
-        episodes=episodes,
-        seed=seed,
         keep_steps=False,
         max_steps=evaluator.max_steps,
+        finished=finished,
     )
-    return weighed(played, evaluator.worth)
+    if isinstance(evaluator.agent, EpisodicAgent):  # it plays one episode after the other
+        return [weighed(run(evaluator.agent, shield, seeds), evaluator.worth) for shield in shields]
+    fitted = [check_environment(evaluator.env_id, shield) for shield in shields]
+    abreast = ShieldedAgent(
+        evaluator.agent, [one.shield for one in fitted if one.shield], episodes, fitted[0].adapter
+    )
+    played = run(abreast, None, np.tile(seeds, len(shields)), batch=_ABREAST)
+    return np.split(weighed(played, evaluator.worth), len(shields))
 
 
 def _first_of(pairs: Demonstrations, most: int) -> Demonstrations:
