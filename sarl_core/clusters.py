@@ -111,8 +111,8 @@ def cluster(address: str) -> Iterator[Any]:
         A ``distributed.Client``.
 
     Raises:
-        InputError: If the address is none, the scheduler cannot be reached, or its workers lack
-            this package or have another version of it.
+        InputError: If the address is none, the scheduler cannot be reached, or it or its workers
+            lack this package or have another version of it.
         WorkError: If the extra "cluster" is not installed.
     """
     with needing_extras():
@@ -220,12 +220,6 @@ def _require_start(client: Any, workers: int, address: str) -> None:
 
 def _require_same_package(client: Any, address: str) -> None:
     """Refuse a cluster that would work differently, or not at all."""
-    try:
-        client.wait_for_workers(1, timeout=_SECONDS)
-    except TimeoutError as error:
-        raise InputError(
-            f"the scheduler at {quoted(address)} has no worker; start some: dask worker {address}"
-        ) from error
 
     def version() -> str:  # sent as it stands: whoever lacks the package could not look it up
         try:
@@ -235,16 +229,26 @@ def _require_same_package(client: Any, address: str) -> None:
         return sarl_core.__version__
 
     own = version()
-    for worker, other in client.run(version).items():
+
+    def require(who: str, other: str) -> None:
         if not other:
-            raise InputError(
-                f"the worker {worker} lacks this package; install version {own} of it there"
-            )
+            raise InputError(f"{who} lacks this package; install version {own} of it there")
         if other != own:
             raise InputError(
-                f"the worker {worker} has version {other} of this package, and here is {own}; "
+                f"{who} has version {other} of this package, and here is {own}; "
                 "install the same one"
             )
+
+    # It reads what it is sent before a worker does.
+    require(f"the scheduler at {quoted(address)}", client.run_on_scheduler(version))
+    try:
+        client.wait_for_workers(1, timeout=_SECONDS)
+    except TimeoutError as error:
+        raise InputError(
+            f"the scheduler at {quoted(address)} has no worker; start some: dask worker {address}"
+        ) from error
+    for worker, other in client.run(version).items():
+        require(f"the worker {worker}", other)
 
 
 def losses() -> tuple[type[Exception], ...]:

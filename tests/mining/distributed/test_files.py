@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import os
 import socket
+import subprocess
+import sys
+import time
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -260,6 +264,36 @@ def test_workers_of_another_version(client: Any, monkeypatch: pytest.MonkeyPatch
         cluster(address),
     ):
         pass
+
+
+@pytest.mark.parametrize(
+    ("package", "says"),
+    [
+        ("raise ImportError", "lacks this package; install version"),
+        ('__version__ = "0.0.1"', "has version 0.0.1 of this package, and here is"),
+    ],
+    ids=["none", "another"],
+)
+def test_a_scheduler_without_this_package(tmp_path: Path, package: str, says: str) -> None:
+    (tmp_path / "sarl_core").mkdir()
+    (tmp_path / "sarl_core" / "__init__.py").write_text(package, encoding="utf-8")
+    known_by = tmp_path / "scheduler.json"
+    command = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard"]
+    command += ["--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(known_by)]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    with subprocess.Popen(command, cwd=tmp_path, env=environment) as scheduler:
+        try:
+            while not known_by.exists():
+                assert scheduler.poll() is None
+                time.sleep(0.05)
+            address = json.loads(known_by.read_text(encoding="utf-8"))["address"]
+            with (
+                pytest.raises(InputError, match=f"the scheduler at '{address}' {says}"),
+                cluster(address),
+            ):
+                pass
+        finally:
+            scheduler.terminate()
 
 
 def test_work_that_ends_every_worker() -> None:
