@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations, Feature, with_formulas
 from sarl_core.demonstrations.fields import ColumnUse
+from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.arrow.parquet_file import is_text, refusing_damage
 from sarl_core.demonstrations.formats.arrow.table import arrow_table
 from sarl_core.demonstrations.formats.columns import ColumnMap
@@ -132,7 +133,12 @@ def pieces_of(paths: Sequence[Path]) -> list[Piece]:
     first: dict[str, str] = {}
     for place, path in enumerate(paths):
         with naming(path.name), refusing_damage(), pq.ParquetFile(path) as file:
-            kinds = {field.name: _kind(field.type) for field in file.schema_arrow}
+            kinds = {
+                field.name: _kind(field.type)
+                for field in file.schema_arrow
+                # What a data frame wrote along, perhaps in one file and not in another.
+                if not vocabulary.ROW_NUMBERS.fullmatch(vocabulary.plain(field.name))
+            }
             first = first or kinds
             _require_same(first, kinds, paths[0].name)
             sizes = [

@@ -15,6 +15,7 @@ from typing import Any
 import dask
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 
 from sarl_core import InputError, WorkError, load_demonstrations
@@ -325,6 +326,19 @@ def test_files_of_one_step_or_of_none_that_is_whole_make_no_difference(
     assert other.trees[0].counts.tolist() == one.trees[0].counts.tolist()
     assert other.held_out[0].lengths.tolist() == one.held_out[0].lengths.tolist()
     assert other.held_out[0].numbers.tolist() == one.held_out[0].numbers.tolist()
+
+
+def test_row_numbers_that_a_data_frame_wrote_along_are_no_columns(
+    tmp_path: Path, mine: Mine
+) -> None:
+    one, other = steps(200), steps(200, first=10)
+    plain = mine(folder_of(tmp_path / "plain", one, other))
+    some = other.set_index(np.arange(200) ** 2)
+    assert "__index_level_0__" in pa.Table.from_pandas(some).column_names
+    assert "__index_level_0__" not in pa.Table.from_pandas(one).column_names
+    for tables in ((one, some), (some, one)):
+        mixed = mine(folder_of(tmp_path / "mixed", *tables))
+        assert mixed.trees[0].counts.tolist() == plain.trees[0].counts.tolist()
 
 
 def test_files_without_any_whole_step_are_refused(tmp_path: Path, mine: Mine) -> None:
