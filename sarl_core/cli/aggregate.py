@@ -140,6 +140,15 @@ def aggregate(
             show_default="an eighth of the rounds, 4 at least",
         ),
     ] = None,
+    search_worth: Annotated[
+        float | None,
+        typer.Option(
+            "--search-worth",
+            help="With --refine: what a failure counts in the search, in units of the return. A "
+            "failure that is rare and counts much hides what else is better in a few episodes.",
+            show_default="as much as the returns of the rounds differ, with --choose failures",
+        ),
+    ] = None,
     validation: Annotated[
         int, typer.Option("--validation", help="Episodes by which the best is chosen.")
     ] = 256,
@@ -169,7 +178,12 @@ def aggregate(
         from sarl_core.improving.aggregation import recorded_environment
         from sarl_core.improving.plan import Plan
 
-        searches = {"episodes": search_episodes, "limit": search_limit, "starts": search_starts}
+        searches = {
+            "episodes": search_episodes,
+            "limit": search_limit,
+            "starts": search_starts,
+            "worth": search_worth,
+        }
         for name, given in searches.items():
             if given is not None and not refine:
                 raise InputError(f"--search-{name} is about a refinement; give --refine, too")
@@ -184,6 +198,7 @@ def aggregate(
             search_episodes=Plan.search_episodes if search_episodes is None else search_episodes,
             search_limit=search_limit,
             search_starts=search_starts,
+            search_worth=search_worth,
             validation=validation,
             report=report,
             seed=seed,

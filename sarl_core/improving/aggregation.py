@@ -490,6 +490,8 @@ class _Run:
 
     def worth(self) -> float:
         """What a failure counts in a search: as much as the returns of the rounds differ."""
+        if self.plan.search_worth is not None:
+            return self.plan.search_worth
         if self.plan.choose == "return":
             return 0.0
         low, high = np.quantile(np.concatenate([one.returns for one in self.rounds]), _USUAL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import get_args
 
@@ -41,6 +42,8 @@ class Plan:
             more of them; None for the environment's own.
         search_starts: Of how many rounds the rules are moved before the best of them is gone on
             with; as `Refinement` does it where None.
+        search_worth: What a failure counts in it, in units of the return; where None, as much as
+            the returns of the rounds differ, and nothing where `choose` is the return.
         validation: Episodes by which the best of all is chosen in the end.
         report: Episodes of the final report.
         seed: Another one gives other episodes.
@@ -61,6 +64,7 @@ class Plan:
     search_episodes: int = 16
     search_limit: int | None = None
     search_starts: int | None = None
+    search_worth: float | None = None
     validation: int = 256
     report: int = 100
     seed: int = 0
@@ -97,6 +101,10 @@ class Plan:
             ("max_steps", _or_one(self.max_steps), 1, None),
         ):
             _check_number(name, value, least, most)
+        if self.search_worth is not None and not 0 <= self.search_worth < math.inf:
+            raise InputError(
+                f"the worth of a failure is {self.search_worth:g}; give a number of 0 or more"
+            )
         _check_number("number of turns", self.turns, 0, self._most_turns())
 
     def _most_turns(self) -> int:

@@ -12,9 +12,9 @@ from sarl_core import InputError, load_demonstrations
 from sarl_core.agents.agent import EXPERT_FOLDER
 from sarl_core.demonstrations.dataset import with_formulas
 from sarl_core.improving.aggregation import aggregate
-from sarl_core.improving.aggregation_files import card_path, save_aggregation
+from sarl_core.improving.aggregation_files import aggregation_card, card_path, save_aggregation
 from sarl_core.improving.alternation import ScoredStates, alternated
-from sarl_core.improving.candidate import structure_of
+from sarl_core.improving.candidate import Evaluator, structure_of
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import ask, importance, scores
 from sarl_core.improving.refinement import Refinement
@@ -133,6 +133,31 @@ def test_episodes_of_the_search_alone_have_another_limit(cart, small_search, mon
     assert min(limit, 500) <= longest[environment] <= limit
     assert 60 < found.reported.lengths.max() <= 500
     assert found.env_id == "CartPole-v1"
+
+
+@pytest.mark.parametrize(
+    ("change", "least", "most"),
+    [
+        ({"search_worth": 7.5, "choose": "failures"}, 7.5, 7.5),
+        ({"search_worth": 7.5}, 7.5, 7.5),
+        ({"choose": "failures"}, 20.0, 500.0),  # returns of CartPole differ by so much
+        ({}, 0.0, 0.0),
+    ],
+)
+def test_what_a_failure_counts_in_the_search(cart, small_search, monkeypatch, change, least, most):
+    worths = set()
+    scores = Evaluator.scores
+
+    def noted(self, *arguments, **named):
+        worths.add(self.worth)
+        return scores(self, *arguments, **named)
+
+    monkeypatch.setattr(Evaluator, "scores", noted)
+    plan = Plan(max_rules=2, rounds=1, episodes=4, validation=8, report=8, turns=1, **change)
+    card = aggregation_card(aggregate(cart, plan), command="typed so")
+    (worth,) = worths
+    assert least <= worth <= most
+    assert card.get("search_worth") == change.get("search_worth")
 
 
 def test_another_seed_gives_other_episodes(cart, small, found):
