@@ -224,9 +224,10 @@ def _require_same_package(client: Any, address: str) -> None:
     def version() -> str:  # sent as it stands: whoever lacks the package could not look it up
         try:
             import sarl_core
-        except ImportError:
+
+            return sarl_core.__version__
+        except Exception:  # a package of another name, or one that is only half there
             return ""
-        return sarl_core.__version__
 
     own = version()
 

@@ -20,6 +20,7 @@ from sarl_core.agents.agent import Agent
 from sarl_core.agents.own import AgentFaultError
 from sarl_core.demonstrations.dataset import Demonstrations, derived_features
 from sarl_core.environments.environment import EnvironmentOrId, with_time_limit
+from sarl_core.environments.failures import no_failures_text
 from sarl_core.errors import InputError
 from sarl_core.improving.alternation import ScoredStates, achieved, alternated, label_scores
 from sarl_core.improving.candidate import Candidate, Evaluator, structure_of
@@ -205,6 +206,11 @@ def aggregate(
     """
     env_id = env_id or recorded_environment(start)
     check_choice(plan.choose, env_id)
+    if plan.search_worth is not None and (why := no_failures_text(env_id)):
+        raise InputError(
+            f"no failure can count in the search, because {why}; say what a failure is "
+            "(--failure), or leave --search-worth out"
+        )
     agents = make_agent(agent, env_id), make_agent(expert, env_id)
     run = _Run(start, plan, env_id, *agents, jobs, executor)
     clock = _Clock(run.planned_units(), progress)

@@ -24,7 +24,7 @@ from sarl_core.processes import run_each, workers_of
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.choices import weighed
 from sarl_core.rollouts.episodes import LOST, run_seeds
-from sarl_core.rollouts.player import check_environment
+from sarl_core.rollouts.player import check_environment, shield_for
 from sarl_core.shielding.projection import Projection
 from sarl_core.shielding.shield import Shield
 
@@ -156,11 +156,13 @@ class Evaluator:
             CancelledError: If `progress` returned False.
         """
         few = _first_of(pairs, _FEW)
-        many = 1 if workers is None else workers_of(workers)
-        most = min(-(-len(candidates) // many), max(_ABREAST // episodes, 1))
+        sizes = _group_sizes(
+            len(candidates), episodes, 1 if workers is None else workers_of(workers)
+        )
+        ends = np.cumsum(sizes).tolist()
         tasks = [
-            (self, candidates[at : at + most], few, seed, episodes)
-            for at in range(0, len(candidates), most)
+            (self, candidates[end - size : end], few, seed, episodes)
+            for size, end in zip(sizes, ends, strict=True)
         ]
         done = 0
 
@@ -178,7 +180,7 @@ class Evaluator:
                 tasks,
                 lost=LOST,
                 executor=workers,
-                progress=lambda tasks_done, _: finished(tasks_done * most * episodes - done),
+                progress=lambda tasks_done, _: finished(sum(sizes[:tasks_done]) * episodes - done),
             )
         return [scores for result in results for scores in result]
 
@@ -204,7 +206,7 @@ class ShieldedAgent:
         self.name, self.n_uniforms = agent.name, agent.n_uniforms
         self._agent, self._shields, self._episodes = agent, shields, episodes
         self._adapter = adapter
-        # To look at every step takes a part of its time.
+        # To ask what the agent is at every step takes a part of its time.
         self._placed = agent if isinstance(agent, PlacedAgent) else None
         self._checking: list[Shield] = []
 
@@ -239,7 +241,7 @@ class ShieldedAgent:
                 for shield, state, action in zip(self._checking, observations, actions, strict=True)
             ]
         )
-        return self._adapter.columns(executed.astype(proposed.dtype))
+        return self._adapter.columns(executed)
 
 
 def episode_scores(
@@ -273,14 +275,29 @@ def episode_scores(
         max_steps=evaluator.max_steps,
         finished=finished,
     )
-    if isinstance(evaluator.agent, EpisodicAgent):  # it plays one episode after the other
+    adapter = check_environment(evaluator.env_id, None).adapter
+    if len(shields) == 1 or not _go_abreast(evaluator.agent, adapter):
         return [weighed(run(evaluator.agent, shield, seeds), evaluator.worth) for shield in shields]
-    fitted = [check_environment(evaluator.env_id, shield) for shield in shields]
-    abreast = ShieldedAgent(
-        evaluator.agent, [one.shield for one in fitted if one.shield], episodes, fitted[0].adapter
-    )
+    fitted = [shield_for(evaluator.env_id, shield) for shield in shields]
+    abreast = ShieldedAgent(evaluator.agent, fitted, episodes, adapter)
     played = run(abreast, None, np.tile(seeds, len(shields)), batch=_ABREAST)
     return np.split(weighed(played, evaluator.worth), len(shields))
+
+
+def _group_sizes(candidates: int, episodes: int, workers: int) -> list[int]:
+    """How many candidates are tried together, so that all workers have about as much to do."""
+    abreast = max(_ABREAST // episodes, 1)
+    rounds = -(-candidates // (workers * abreast))
+    groups = min(candidates, workers * rounds)
+    return [len(one) for one in np.array_split(np.arange(candidates), groups)] if groups else []
+
+
+def _go_abreast(agent: Agent, adapter: SpaceAdapter) -> bool:
+    """Whether several shields are sooner asked about a row each than one about many."""
+    if isinstance(agent, EpisodicAgent):  # it plays one episode after the other
+        return False
+    one_label = adapter.is_discrete and adapter.action_shape == ()
+    return one_label or adapter.action_space.dtype == np.float32
 
 
 def _first_of(pairs: Demonstrations, most: int) -> Demonstrations:

@@ -146,6 +146,20 @@ def test_files_whose_columns_differ_are_named(folder: Path) -> None:
         load_demonstrations(folder)
 
 
+@pytest.mark.parametrize("numbered", ["run_1.csv", "run_2.csv"])
+@pytest.mark.parametrize("name", ["", "Unnamed: 0", "index"])
+def test_row_numbers_that_a_data_frame_wrote_along_need_not_be_in_all(
+    folder: Path, numbered: str, name: str
+) -> None:
+    digest = load_demonstrations(folder).digest
+    header, *rows = (folder / numbered).read_text().splitlines()
+    lines = [f"{name},{header}", *(f"{7 * place},{row}" for place, row in enumerate(rows))]
+    (folder / numbered).write_text("\n".join(lines) + "\n")
+    assert load_demonstrations(folder).digest == digest
+    with pytest.raises(InputError, match="there is no column 'index'"):
+        load_demonstrations(folder, columns=ColumnMap(("index", "obs_x", "obs_y"), ("action",)))
+
+
 def test_files_of_several_formats_are_refused(folder: Path) -> None:
     (folder / "x.jsonl").write_bytes(b'{"obs_x": 1, "action": 0}\n')
     with pytest.raises(InputError, match=r"several formats, CSV \('run_1\.csv'\) and JSON lines"):

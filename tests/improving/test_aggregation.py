@@ -160,6 +160,12 @@ def test_what_a_failure_counts_in_the_search(cart, small_search, monkeypatch, ch
     assert card.get("search_worth") == change.get("search_worth")
 
 
+def test_no_failure_counts_where_none_is_known():
+    pendulum = load_demonstrations(DATA / "pendulum.parquet").select(range(2))
+    with pytest.raises(InputError, match="no failure can count in the search, because"):
+        aggregate(pendulum, Plan(max_rules=4, turns=1, search_worth=50.0))
+
+
 def test_another_seed_gives_other_episodes(cart, small, found):
     other = aggregate(cart, replace(small, seed=1, rounds=1))
     assert not np.array_equal(other.rounds[0].returns, found.rounds[0].returns)

@@ -1,5 +1,7 @@
 """Rule sets that are tried side by side bring what each brings alone."""
 
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.progress import CancelledError
 from sarl_core.rollouts.choices import weighed
 from sarl_core.rollouts.episodes import rollout
+from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.trial import make_agent
 from sarl_core.shielding.shield import Shield
 
@@ -62,19 +65,15 @@ CASES = {
 }
 
 
-def candidates(task, divider, count=9):
-    pairs = load_demonstrations(DATA / f"{task}.parquet")
+def candidates(pairs, divider, count=9):
     trees = grow_budgeted_trees(pairs, max_rules=4, divider=divider, seed=0)
-    return pairs, [Candidate.of_trees(trees), *Movement(trees, pairs, step=0.6, seed=3).ask()][
-        :count
-    ]
+    moved = Movement(trees, pairs, step=0.6, seed=3).ask()
+    return [Candidate.of_trees(trees), *moved][:count]
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_each_brings_what_it_brings_alone(case):
-    task, named, divider, projection = CASES[case]
-    pairs, tried = candidates(task, divider)
-    agent = make_agent(named, pairs.env_id)
+def require_alike(pairs, agent, divider, projection, workers=None):
+    """All together bring what each brings alone."""
+    tried = candidates(pairs, divider)
     evaluator = Evaluator(
         pairs.env_id, agent, projection=projection, divider=divider, worth=WORTH, max_steps=STEPS
     )
@@ -84,7 +83,7 @@ def test_each_brings_what_it_brings_alone(case):
         pairs,
         seed=40,
         episodes=EPISODES,
-        workers=None,
+        workers=workers,
         progress=lambda *numbers: told.append(numbers),
     )
     alone = [
@@ -106,11 +105,59 @@ def test_each_brings_what_it_brings_alone(case):
     assert len(np.unique(together)) > EPISODES
     assert (told[0], told[-1]) == ((0, len(tried)), (len(tried), len(tried)))
     assert told == sorted(told)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_each_brings_what_it_brings_alone(case):
+    task, named, divider, projection = CASES[case]
+    pairs = load_demonstrations(DATA / f"{task}.parquet")
+    agent = make_agent(named, pairs.env_id)
+    require_alike(pairs, agent, divider, projection)
     assert isinstance(agent, EpisodicAgent) == (case == "one episode after the other")
 
 
+@pytest.mark.parametrize(
+    "name", ["Offset", "MultiDiscrete", "MultiBinary", "Matrix", "Precise", "Whole"]
+)
+def test_in_every_kind_of_space(name):
+    env_id = f"toy/{name}-v0"
+    require_alike(record(env_id, "novice", steps=150), make_agent("novice", env_id), 3, "centre")
+
+
+def test_rules_that_know_the_features_in_another_order():
+    pairs = load_demonstrations(DATA / "cartpole.parquet")
+    turned = replace(
+        pairs,
+        observations=pairs.observations[:, ::-1].copy(),
+        feature_names=pairs.feature_names[::-1],
+        feature_units=pairs.feature_units[::-1],
+    )
+    require_alike(turned, make_agent("novice", pairs.env_id), 2, "centre")
+
+
+class Counting(ThreadPoolExecutor):
+    """Says how many it works on at once, and counts what it is given."""
+
+    def __init__(self, workers):
+        super().__init__(workers)
+        self.workers, self.given = workers, 0
+
+    def submit(self, *arguments, **named):
+        self.given += 1
+        return super().submit(*arguments, **named)
+
+
+@pytest.mark.parametrize(("workers", "tasks"), [(1, 2), (2, 2), (4, 4), (16, 9)])
+def test_whoever_does_the_work_has_about_as_much_of_it(workers, tasks):
+    pairs = load_demonstrations(DATA / "pendulum.parquet").select(range(4))
+    with Counting(workers) as executor:
+        require_alike(pairs, make_agent("novice", pairs.env_id), 5, "clip", executor)
+    assert executor.given == tasks
+
+
 def test_who_stops_need_not_wait_for_all_that_are_tried_together():
-    pairs, tried = candidates("cartpole", 2)
+    pairs = load_demonstrations(DATA / "cartpole.parquet")
+    tried = candidates(pairs, 2)
     agent = make_agent("novice", pairs.env_id)
     evaluator = Evaluator(
         pairs.env_id, agent, projection="centre", divider=2, worth=0.0, max_steps=20

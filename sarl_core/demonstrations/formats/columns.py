@@ -414,7 +414,7 @@ def guess_notes(guess: Guess) -> tuple[str, ...]:
         notes.append(f"the column {name!r} was taken as the {what}")
     by_reason: dict[str, list[str]] = {}
     for name, why in guess.unused.items():
-        if name not in guess.roles and not vocabulary.ROW_NUMBERS.fullmatch(plain(name)):
+        if name not in guess.roles and not vocabulary.numbers_rows(name):
             by_reason.setdefault(why, []).append(name)
     for why, left in by_reason.items():
         one = len(left) == 1

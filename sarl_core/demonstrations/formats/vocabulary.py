@@ -87,6 +87,11 @@ def plain(name: str) -> str:
     return re.sub(r"[ .\-/_]+", "_", text.lower()) if not text.startswith("__") else text.lower()
 
 
+def numbers_rows(name: str) -> bool:
+    """Whether a column's name says that a data frame wrote its row numbers along."""
+    return ROW_NUMBERS.fullmatch(plain(name)) is not None
+
+
 def stripped(column: str, prefixes: str) -> str | None:
     """What follows a prefix: "x" of "obs_x", "0" of "obs[0]" and "obs0"; None if nothing does."""
     bare = re.fullmatch(rf"(?:{prefixes})(\d*)", column.strip(), re.I)

@@ -137,16 +137,17 @@ def pieces_of(paths: Sequence[Path]) -> list[Piece]:
                 field.name: _kind(field.type)
                 for field in file.schema_arrow
                 # What a data frame wrote along, perhaps in one file and not in another.
-                if not vocabulary.ROW_NUMBERS.fullmatch(vocabulary.plain(field.name))
+                if not vocabulary.numbers_rows(field.name)
             }
-            first = first or kinds
+            if not place:
+                first = kinds
             _require_same(first, kinds, paths[0].name)
             sizes = [
                 file.metadata.row_group(group).num_rows
                 for group in range(file.metadata.num_row_groups)
             ]
             if sizes:
-                require_memory(table_memory(max(sizes), len(kinds), 0))
+                require_memory(table_memory(max(sizes), len(file.schema_arrow), 0))
         for start, groups in _packed(sizes):
             rows = sum(sizes[start : start + groups])
             if start and rows < _FEWEST:  # they are no demonstrations by themselves

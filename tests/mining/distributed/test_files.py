@@ -271,9 +271,10 @@ def test_workers_of_another_version(client: Any, monkeypatch: pytest.MonkeyPatch
     ("package", "says"),
     [
         ("raise ImportError", "lacks this package; install version"),
+        ("", "lacks this package; install version"),
         ('__version__ = "0.0.1"', "has version 0.0.1 of this package, and here is"),
     ],
-    ids=["none", "another"],
+    ids=["none", "nothing in it", "another"],
 )
 def test_a_scheduler_without_this_package(tmp_path: Path, package: str, says: str) -> None:
     (tmp_path / "sarl_core").mkdir()
@@ -284,8 +285,10 @@ def test_a_scheduler_without_this_package(tmp_path: Path, package: str, says: st
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     with subprocess.Popen(command, cwd=tmp_path, env=environment) as scheduler:
         try:
-            while not known_by.exists():
+            until = time.monotonic() + 60
+            while not (known_by.exists() and known_by.read_text(encoding="utf-8")):
                 assert scheduler.poll() is None
+                assert time.monotonic() < until
                 time.sleep(0.05)
             address = json.loads(known_by.read_text(encoding="utf-8"))["address"]
             with (
@@ -338,6 +341,7 @@ def test_row_numbers_that_a_data_frame_wrote_along_are_no_columns(
     assert "__index_level_0__" not in pa.Table.from_pandas(one).column_names
     for tables in ((one, some), (some, one)):
         mixed = mine(folder_of(tmp_path / "mixed", *tables))
+        assert load_demonstrations(tmp_path / "mixed").n_episodes == 8
         assert mixed.trees[0].counts.tolist() == plain.trees[0].counts.tolist()
 
 

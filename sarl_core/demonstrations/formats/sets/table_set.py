@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sarl_core.demonstrations.formats import vocabulary
 from sarl_core.demonstrations.formats.columns import SINGLES, ColumnMap, guess_roles, listed
 from sarl_core.demonstrations.formats.kinds import FORMATS, extension_of, format_of, unpacked
 from sarl_core.demonstrations.formats.metadata import Metadata
@@ -44,8 +45,9 @@ class TableSet:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the columns, which are the same in every file."""
-        own = self.tables[0].names
+        """Names of the columns that every file has."""
+        every = [set(table.names) for table in self.tables]
+        own = tuple(name for name in self.tables[0].names if all(name in one for one in every))
         return own if self.marks is None else (*own, _EPISODE)
 
     @property
@@ -180,14 +182,16 @@ def _require_same(first: Table, table: Table, path: str) -> None:
         )
     if table.names == first.names:
         return
-    lacking = [name for name in first.names if name not in table.names]
-    surplus = [name for name in table.names if name not in first.names]
+    lacking, surplus = (
+        [name for name in names if name not in others and not vocabulary.numbers_rows(name)]
+        for names, others in ((first.names, table.names), (table.names, first.names))
+    )
     if lacking:
         what = f"it has no column {listed(lacking[:1])}, and {path!r} has"
     elif surplus:
         what = f"it has a column {listed(surplus[:1])}, and {path!r} has none"
     else:
-        return  # in another order, which the names mend
+        return  # in another order, which the names mend, or with row numbers in some alone
     raise InputError(f"{what}; give files of the same columns")
 
 
