@@ -23,7 +23,8 @@ from sarl_core.mining.combining.candidates import pairs_of_like_kind
 FOLDER = Path(__file__).resolve().parents[2]
 OUT = FOLDER / "data" / "rules" / "budgets.json"
 _LANDER = Plan(2, rounds=16, episodes=24, validation=128, choose="failures")
-_WALKER = Plan(2, rounds=8, episodes=8, validation=48, divider=15, choose="failures")
+# By failures the walker that stands still would be best: it never falls.
+_WALKER = Plan(2, rounds=8, episodes=8, validation=48, divider=15)
 PLANS: dict[str, tuple[Plan, tuple[int, ...], tuple[int, ...]]] = {
     "cartpole": (
         Plan(2, rounds=8, episodes=20, validation=128, choose="failures"),
