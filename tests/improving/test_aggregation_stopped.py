@@ -50,18 +50,22 @@ def calls(monkeypatch):
     """Every rollout: (what asked for it, whether its steps are kept, seeds)."""
     found = []
 
-    def spy(module):
-        rollout = module.rollout
+    def spy(module, name, seeds_of):
+        plays = getattr(module, name)
 
         def recorded(*arguments, **named):
-            seeds = range(named["seed"], named["seed"] + named["episodes"])
-            found.append((module, named["keep_steps"], seeds))
-            return rollout(*arguments, **named)
+            found.append((module, named["keep_steps"], seeds_of(arguments, named)))
+            return plays(*arguments, **named)
 
-        monkeypatch.setattr(module, "rollout", recorded)
+        monkeypatch.setattr(module, name, recorded)
 
-    for module in (aggregation, refinement, candidate):
-        spy(module)
+    for module in (aggregation, refinement):
+        spy(
+            module,
+            "rollout",
+            lambda _, named: range(named["seed"], named["seed"] + named["episodes"]),
+        )
+    spy(candidate, "run_seeds", lambda arguments, _: arguments[3].tolist())
     return found
 
 
