@@ -201,7 +201,8 @@ def aggregate(
         that was finished counts: the rounds, the refinement as far as it went, the choice.
 
     Raises:
-        InputError: If agent, expert and environment do not fit, or the expert acts at random.
+        InputError: If agent, expert and environment do not fit, or the expert acts at random; or
+            if failures are to count where nothing says what one is.
         CancelledError: If `progress` returned False before the first round was finished.
     """
     env_id = env_id or recorded_environment(start)
