@@ -156,14 +156,9 @@ class Evaluator:
             CancelledError: If `progress` returned False.
         """
         few = _first_of(pairs, _FEW)
-        sizes = _group_sizes(
-            len(candidates), episodes, 1 if workers is None else workers_of(workers)
-        )
-        ends = np.cumsum(sizes).tolist()
-        tasks = [
-            (self, candidates[end - size : end], few, seed, episodes)
-            for size, end in zip(sizes, ends, strict=True)
-        ]
+        many = 1 if workers is None else workers_of(workers)
+        groups = _groups(candidates, episodes, many)
+        tasks = [(self, group, few, seed, episodes) for group in groups]
         done = 0
 
         def finished(count: int = 1) -> None:
@@ -180,7 +175,7 @@ class Evaluator:
                 tasks,
                 lost=LOST,
                 executor=workers,
-                progress=lambda tasks_done, _: finished(sum(sizes[:tasks_done]) * episodes - done),
+                progress=lambda ended, _: finished(sum(map(len, groups[:ended])) * episodes - done),
             )
         return [scores for result in results for scores in result]
 
@@ -284,12 +279,13 @@ def episode_scores(
     return np.split(weighed(played, evaluator.worth), len(shields))
 
 
-def _group_sizes(candidates: int, episodes: int, workers: int) -> list[int]:
-    """How many candidates are tried together, so that all workers have about as much to do."""
+def _groups(candidates: Sequence[Candidate], episodes: int, workers: int) -> list[list[Candidate]]:
+    """Those that are tried together, so that all workers have about as much to do."""
     abreast = max(_ABREAST // episodes, 1)
-    rounds = -(-candidates // (workers * abreast))
-    groups = min(candidates, workers * rounds)
-    return [len(one) for one in np.array_split(np.arange(candidates), groups)] if groups else []
+    rounds = -(-len(candidates) // (workers * abreast))
+    groups = min(len(candidates), workers * rounds)
+    places = np.array_split(np.arange(len(candidates)), groups) if groups else []
+    return [[candidates[place] for place in group] for group in places]
 
 
 def _go_abreast(agent: Agent, adapter: SpaceAdapter) -> bool:
