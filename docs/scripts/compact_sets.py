@@ -36,6 +36,7 @@ OPTIONS = {
     "search_episodes": "search-episodes",
     "search_limit": "search-limit",
     "search_starts": "search-starts",
+    "search_steps": "search-steps",
     "search_worth": "search-worth",
     "validation": "validation",
     "report": "report-episodes",

@@ -140,6 +140,15 @@ def aggregate(
             show_default="an eighth of the rounds, 4 at least",
         ),
     ] = None,
+    search_steps: Annotated[
+        int,
+        typer.Option(
+            "--search-steps",
+            help="With --refine: change the rules in so many steps a turn by what their own "
+            "episodes say of each label, in place of what the expert says. Fewer episodes lead "
+            "few rules further so; 8 is a good number.",
+        ),
+    ] = 0,
     search_worth: Annotated[
         float | None,
         typer.Option(
@@ -182,6 +191,7 @@ def aggregate(
             "episodes": search_episodes,
             "limit": search_limit,
             "starts": search_starts,
+            "steps": search_steps or None,
             "worth": search_worth,
         }
         for name, given in searches.items():
@@ -198,6 +208,7 @@ def aggregate(
             search_episodes=Plan.search_episodes if search_episodes is None else search_episodes,
             search_limit=search_limit,
             search_starts=search_starts,
+            search_steps=search_steps,
             search_worth=search_worth,
             validation=validation,
             report=report,

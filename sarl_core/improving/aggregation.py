@@ -300,7 +300,11 @@ class _Run:
         refined = 0
         if plan.turns:
             refined = refinement_cost(
-                plan.turns, plan.search_episodes, plan.rounds, plan.search_starts
+                plan.turns,
+                plan.search_episodes,
+                plan.rounds,
+                plan.search_starts,
+                plan.search_steps,
             )
         chosen = _choice_cost(plan, _most_choices(plan))
         return plan.rounds * plan.episodes + refined + chosen + plan.report
@@ -470,6 +474,7 @@ class _Run:
             max_rules=plan.max_rules,
             episodes=plan.search_episodes,
             moved=plan.search_starts,
+            steps=plan.search_steps,
             first=first,
             seed=plan.seed,
             jobs=self.jobs,

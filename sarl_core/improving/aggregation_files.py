@@ -126,6 +126,7 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         **({"search_episodes": plan.search_episodes} if plan.turns else {}),
         **({} if plan.search_limit is None else {"search_limit": plan.search_limit}),
         **({} if plan.search_starts is None else {"search_starts": plan.search_starts}),
+        **({} if not plan.search_steps else {"search_steps": plan.search_steps}),
         **({} if plan.search_worth is None else {"search_worth": plan.search_worth}),
         "rounds": [_round(one) for one in aggregation.rounds],
         "chosen_round": aggregation.chosen,

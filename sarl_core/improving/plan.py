@@ -42,6 +42,8 @@ class Plan:
             more of them; None for the environment's own.
         search_starts: Of how many rounds the rules are moved before the best of them is gone on
             with; as `Refinement` does it where None.
+        search_steps: In each turn, in which the rules are changed by what their own episodes say
+            in place of what the expert says; 0 for none.
         search_worth: What a failure counts in it, in units of the return; where None, as much as
             the returns of the rounds differ, and nothing where `choose` is the return.
         validation: Episodes by which the best of all is chosen in the end.
@@ -64,6 +66,7 @@ class Plan:
     search_episodes: int = 16
     search_limit: int | None = None
     search_starts: int | None = None
+    search_steps: int = 0
     search_worth: float | None = None
     validation: int = 256
     report: int = 100
@@ -98,6 +101,7 @@ class Plan:
             ("seed", self.seed, 0, LARGEST_RUN),
             ("limit of a search episode", _or_one(self.search_limit), 1, None),
             ("number of search starts", _or_one(self.search_starts), 1, self.rounds),
+            ("number of search steps", self.search_steps, 0, None),
             ("max_steps", _or_one(self.max_steps), 1, None),
         ):
             _check_number(name, value, least, most)
@@ -110,14 +114,17 @@ class Plan:
     def _most_turns(self) -> int:
         """Of which the seeds of one run are enough."""
         none, one = (
-            refinement_seeds(n, self.search_episodes, self.rounds, self.search_starts)
+            refinement_seeds(
+                n, self.search_episodes, self.rounds, self.search_starts, self.search_steps
+            )
             for n in range(2)
         )
         left = SEEDS_A_RUN - none
         if self.turns and left < one - none:
             raise InputError(
-                f"what comes before the first turn takes {none:,} episodes of its own, and one run "
-                f"has {SEEDS_A_RUN:,}; give fewer rounds or --search-episodes"
+                f"the first turn and what comes before it take {one:,} episodes of their own, and "
+                f"one run has {SEEDS_A_RUN:,}; give fewer rounds, --search-steps or "
+                "--search-episodes"
             )
         return max(left, 0) // (one - none)
 

@@ -12,6 +12,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,16 +22,23 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.derived import DerivedFeature
 from sarl_core.improving.candidate import Candidate, Evaluator
 from sarl_core.improving.movement import FIRST_STEP, POPULATION, Movement
+from sarl_core.improving.policy_improvement import (
+    MOST_PROPOSALS,
+    DeviatingAgent,
+    PolicyImprovement,
+)
 from sarl_core.improving.questions import answered, ask, scores, with_values
 from sarl_core.improving.shapes import MetStates, neighbours
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
 from sarl_core.mining.budgeted_trees import leaf_rules
 from sarl_core.mining.combining.candidates import Pair, candidates
 from sarl_core.mining.growing.structure import count_tree
+from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, rollout
+from sarl_core.rollouts.player import check_environment, shield_for
 from sarl_core.shielding.shield import Shield
 
 _LONG = 0.9  # quantile of the expert's lengths
@@ -49,6 +57,10 @@ _MET = 2  # in which it is seen where the rules lead
 _RANKED = 4  # for the best shapes, and for each way that is gone
 _CAREFUL = 2  # where what is good already is moved on
 _COMPARED = 32  # for the best starts, and for what is to take the place of what is there
+_DEVIATED = 12  # of a step: in which single actions are others, so that it is seen what that brings
+_FOLLOWED = 8  # in which the rules are followed
+_BEFORE = 2  # times as many of either, before the first step
+_PROPOSED = (3, 24)  # for what is proposed, before the worse half is left, and for the best
 
 
 def _halvings(ways: int) -> list[tuple[int, int]]:
@@ -65,7 +77,9 @@ def _ways_of(starts: int, moved: int | None) -> int:
     return min(starts, max(_SHAPES, starts // _STARTS) if moved is None else moved)
 
 
-def refinement_cost(turns: int, episodes: int, starts: int = 1, moved: int | None = None) -> int:
+def refinement_cost(
+    turns: int, episodes: int, starts: int = 1, moved: int | None = None, steps: int = 0
+) -> int:
     """Most episodes of a refinement.
 
     Args:
@@ -73,26 +87,35 @@ def refinement_cost(turns: int, episodes: int, starts: int = 1, moved: int | Non
         episodes: Of each neighbour.
         starts: What it may begin with.
         moved: How many of these are moved; as `Refinement` does it where None.
+        steps: Of a turn, as `Refinement` takes them.
     """
 
     def ranked(count: int, times: int) -> int:
         return planned_episodes(count, episodes, times * episodes)
 
+    first, most = (times * episodes for times in _PROPOSED)
+    played = (_DEVIATED + _FOLLOWED) * episodes
+    step = played + planned_episodes(1 + MOST_PROPOSALS, first, most)
+
     def halved(ways: int) -> int:
         return sum(
-            left * (generations * POPULATION + _RANKED) * episodes
+            left * (generations * (step if steps else POPULATION * episodes) + _RANKED * episodes)
             for left, generations in _halvings(ways)
         )
 
     met, compared = _MET * episodes, 2 * _COMPARED * episodes
     ways = _ways_of(starts, moved)
+    before = ways * _BEFORE * played if steps else 0
     begun = ranked(starts, _COMPARED) + met + halved(ways) + compared
-    shapes, late = ranked(_NEIGHBOURS, _RANKED), _LATE * POPULATION * _CAREFUL * episodes
-    turn = met + shapes + halved(_SHAPES) + late + 2 * compared
-    return _EXPERT * episodes + (begun if starts > 1 else 0) + turns * turn
+    late = _LATE * POPULATION * _CAREFUL * episodes
+    changed = steps * step + met if steps else ranked(_NEIGHBOURS, _RANKED) + halved(_SHAPES)
+    turn = met + changed + late + 2 * compared
+    return _EXPERT * episodes + before + (begun if starts > 1 else 0) + turns * turn
 
 
-def refinement_seeds(turns: int, episodes: int, starts: int = 1, moved: int | None = None) -> int:
+def refinement_seeds(
+    turns: int, episodes: int, starts: int = 1, moved: int | None = None, steps: int = 0
+) -> int:
     """Most seeds of a refinement: all that are compared play the same episodes.
 
     Args:
@@ -100,14 +123,24 @@ def refinement_seeds(turns: int, episodes: int, starts: int = 1, moved: int | No
         episodes: Of each neighbour.
         starts: What it may begin with.
         moved: How many of these are moved; as `Refinement` does it where None.
+        steps: Of a turn, as `Refinement` takes them.
     """
+    played = _DEVIATED + _FOLLOWED
+    step = played + _PROPOSED[-1]
 
     def halved(ways: int) -> int:
-        return sum(left * generations + _RANKED for left, generations in _halvings(ways))
+        each = step if steps else 1
+        return sum(left * generations * each + _RANKED for left, generations in _halvings(ways))
 
-    begun = _COMPARED + _MET + halved(_ways_of(starts, moved)) + _COMPARED
-    turn = _MET + _RANKED + halved(_SHAPES) + _COMPARED + _LATE * _CAREFUL + _COMPARED
-    return episodes * (_EXPERT + (begun if starts > 1 else 0) + turns * turn)
+    ways = _ways_of(starts, moved)
+    before = ways * _BEFORE * played if steps else 0
+    begun = _COMPARED + _MET + halved(ways) + _COMPARED
+    changed = steps * step + _MET if steps else _RANKED + halved(_SHAPES)
+    turn = _MET + changed + _COMPARED + _LATE * _CAREFUL + _COMPARED
+    return episodes * (_EXPERT + before + (begun if starts > 1 else 0) + turns * turn)
+
+
+Way: TypeAlias = Movement | PolicyImprovement
 
 
 class Refinement:
@@ -124,6 +157,7 @@ class Refinement:
         max_rules: int,
         episodes: int,
         moved: int | None = None,
+        steps: int = 0,
         first: int,
         seed: int = 0,
         jobs: int = 1,
@@ -143,6 +177,8 @@ class Refinement:
             episodes: For each neighbour, the same for all of a generation.
             moved: How many of the starts that achieve most have their thresholds moved; an eighth
                 of all, four at least, where None.
+            steps: In each turn, in which the rules are changed by what their own episodes say, in
+                place of neighbours in shape; then what it may begin with is moved in the same way.
             first: Seed of the first episode.
             seed: Another one gives another way.
             jobs: Processes; changes the speed, never the result.
@@ -155,11 +191,13 @@ class Refinement:
         self._way: Movement | None = None  # that led here
         self._step = FIRST_STEP  # how wide its steps were in the end
         self._pairs = pairs
+        self._dimensions = label_dimensions(pairs, evaluator.divider)
         self._progress: Progress | None = None
         self._done = self._total = 0
         self._evaluator, self._expert = evaluator, expert
         self._combined, self._max_rules, self._episodes = combined, max_rules, episodes
-        self._moved_starts = moved
+        self._moved_starts, self._steps = moved, steps
+        self._improvement: PolicyImprovement | None = None  # that led here
         self._next, self._generator = first, np.random.default_rng(seed)
         self._workers = executor_of(jobs, executor)
 
@@ -203,35 +241,47 @@ class Refinement:
         return list(different.values())
 
     def _cost(self, turns: int, starts: int = 1) -> int:
-        return refinement_cost(turns, self._episodes, starts, self._moved_starts)
+        return refinement_cost(turns, self._episodes, starts, self._moved_starts, self._steps)
 
     def _begin(self) -> None:
         """Begin with what achieves most when it is moved."""
         self._evaluator = replace(self._evaluator, max_steps=self._patience())
         if len(self._starts) == 1:
             self._better(self.start)
+            if self._steps:
+                self._improvement = self._improving(self.start)
             return
-        before = self._done
         ranking = self._ranking(self._starts, self._pairs, _COMPARED)
         self._begin_with(ranking[0])
         self._better(self.start)
         met = self._met()
         best = ranking[: _ways_of(len(self._starts), self._moved_starts)]
-        ways = [self._movement(self._starts[index], met) for index in best]
+        begun = [self._starts[index] for index in best]
+        ways: Sequence[Way] = (
+            [self._improving(start) for start in begun]
+            if self._steps
+            else [self._movement(start, met) for start in begun]
+        )
         place = self._halved(ways, met)
-        if self._is_as_good(ways[place].here, self.start, met):
+        way = ways[place]
+        if self._is_as_good(way.here, self.start, met):
             self._begin_with(best[place])
-            self._go_on(ways[place])
-        cost = self._cost(0, len(self._starts)) - self._cost(0)
-        self._tell(before + cost - self._done)
+            self._go_on(way)
+        elif isinstance(way, PolicyImprovement):
+            self._improvement = way  # what it has learned serves on
+        self._tell(self._cost(0, len(self._starts)) - self._done)
 
     def _begin_with(self, index: int) -> None:
         self.begun, self.start = index, self._starts[index]
         self.here = self.start
 
-    def _go_on(self, way: Movement) -> None:
+    def _go_on(self, way: Way) -> None:
         """From where a way has come to."""
-        self._way, self.here, self._step = way, way.here, way.step
+        self.here = way.here
+        if isinstance(way, Movement):
+            self._way, self._step = way, way.step
+        else:
+            self._way, self._improvement = None, way
         self._better(self.here)
 
     def _patience(self) -> int:
@@ -247,11 +297,16 @@ class Refinement:
     def _turn(self) -> None:
         """Change the shape, if that is better, and move the thresholds, if that is."""
         met = self._met()
-        ways = [self._movement(shape, met) for shape in self._shapes(met)]
+        ways: Sequence[Way]
+        if self._steps:
+            ways = [self._improved_further(met)]
+        else:
+            ways = [self._movement(shape, met) for shape in self._shapes(met)]
         if ways:
             changed = ways[self._halved(ways, met)]
             if self._is_as_good(changed.here, self.here, met):
                 self._go_on(changed)
+                met = self._met() if self._steps else met
         # What it has learned of the way serves on.
         way = self._way or self._movement(self.here, met)
         self._move(way, _LATE, met, times=_CAREFUL)
@@ -260,7 +315,15 @@ class Refinement:
         else:  # it was led astray
             self._way, self._step = None, way.step
 
-    def _halved(self, ways: Sequence[Movement], met: MetStates) -> int:
+    def _improved_further(self, met: MetStates) -> PolicyImprovement:
+        """Changed by what the episodes say, from here."""
+        way = self._improvement
+        assert way is not None
+        way.here = self.here
+        self._advance(way, self._steps, met)
+        return way
+
+    def _halved(self, ways: Sequence[Way], met: MetStates) -> int:
         """Move all a little, the better half on, and so forth; the place of the one that is left.
 
         What achieves most before it is moved need not be what achieves most then. One alone is
@@ -269,7 +332,7 @@ class Refinement:
         left: Sequence[int] = range(len(ways))
         for _, generations in _halvings(len(ways)):
             for place in left:
-                self._move(ways[place], generations, met)
+                self._advance(ways[place], generations, met)
             moved = [ways[place].here for place in left]
             ranking = self._ranking(moved, met.pairs, _RANKED, first=_RANKED)
             left = [left[rank] for rank in ranking[: (len(left) + 1) // 2]]
@@ -283,14 +346,22 @@ class Refinement:
         both = [moved, there]
         return not self._ranking(both, met.pairs, _COMPARED, first=_COMPARED)[0]
 
-    def _met(self) -> MetStates:
-        """Where the rules lead now, and what the expert says there."""
-        rules = leaf_rules(self.here.trees(self._pairs, self._evaluator.divider))
-        shield = Shield(rules, projection=self._evaluator.projection)
-        table = self._play(self._evaluator.agent, shield, _MET).steps
+    def _met(self, way: PolicyImprovement | None = None) -> MetStates:
+        """Where the rules lead now, and what the expert says there.
+
+        Args:
+            way: Whose rules they are, and who learns from these episodes; of here where None.
+        """
+        here = self.here if way is None else way.here
+        played = self._play(
+            self._evaluator.agent, self._shield(here), _MET if way is None else _FOLLOWED
+        )
+        if way is not None:
+            way.add(played)
+        table = played.steps
         assert table is not None
         wanted = ask(self._expert, table.observation, table.episode)
-        queried = self.here.derived
+        queried = here.derived
         rows = with_values(table.observation, queried)
         if not len(rows):  # nothing of what it asks about has a value where it leads
             demonstrated = self._pairs.deriving(queried)
@@ -314,7 +385,7 @@ class Refinement:
         )
         offered = [DerivedFeature(one) for one in candidates(pairs, self._some_pairs())]
         # What the trees ask about stands first, where they look for it.
-        pairs = pairs.deriving(list(dict.fromkeys([*self.here.derived, *offered])))
+        pairs = pairs.deriving(list(dict.fromkeys([*here.derived, *offered])))
         return MetStates(pairs, scores(self._expert, pairs.raw_observations))
 
     def _some_pairs(self) -> list[Pair]:
@@ -363,6 +434,47 @@ class Refinement:
         # Wide steps away from what was moved to where it is good lead astray.
         seed = int(self._generator.integers(2**31))
         return Movement(trees, pairs, step=self._step, seed=seed)
+
+    def _improving(self, here: Candidate) -> PolicyImprovement:
+        """A way that begins here, and knows a little."""
+        seed = int(self._generator.integers(2**31))
+        way = PolicyImprovement(
+            here,
+            self._dimensions,
+            observed=len(self._pairs.observed),
+            max_rules=self._max_rules,
+            worth=self._evaluator.worth,
+            seed=seed,
+        )
+        for _ in range(_BEFORE):
+            self._deviate(way)
+            self._met(way)
+        return way
+
+    def _shield(self, candidate: Candidate) -> Shield:
+        rules = leaf_rules(candidate.trees(self._pairs, self._evaluator.divider))
+        return Shield(rules, projection=self._evaluator.projection)
+
+    def _advance(self, way: Way, times: int, met: MetStates) -> None:
+        """Go so many steps, or generations, of a way."""
+        if isinstance(way, Movement):
+            self._move(way, times, met)
+            return
+        for _ in range(times):
+            self._deviate(way)
+            met = self._met(way)
+            tried = [way.here, *way.proposals(met.pairs)]
+            if len(tried) > 1:
+                first, most = _PROPOSED
+                way.here = tried[self._ranking(tried, met.pairs, most, first=first)[0]]
+
+    def _deviate(self, way: PolicyImprovement) -> None:
+        """Show it what single other actions bring."""
+        env_id = self._evaluator.env_id
+        shield = shield_for(env_id, self._shield(way.here))
+        adapter = check_environment(env_id, None).adapter
+        agent = DeviatingAgent(shield, self._dimensions, adapter)
+        way.add(self._play(agent, None, _DEVIATED))
 
     def _move(
         self, movement: Movement, generations: int, met: MetStates, *, times: int = 1

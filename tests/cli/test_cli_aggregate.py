@@ -67,6 +67,12 @@ def test_without_an_expert_the_gaps_are_written(run, tmp_path):
         (("--search-episodes", "9"), "--search-episodes is about a refinement"),
         (("--search-starts", "9"), "--search-starts is about a refinement"),
         (("--refine", "1", "--search-starts", "99"), "the number of search starts is 99; give"),
+        (("--search-steps", "9"), "--search-steps is about a refinement"),
+        (("--refine", "1", "--search-steps", "-1"), "the number of search steps is -1; give 0"),
+        (
+            ("--refine", "1", "--search-steps", "9999"),
+            "the first turn and what comes before it take",
+        ),
         (("--search-worth", "9"), "--search-worth is about a refinement"),
         (("--refine", "1", "--search-worth", "-1"), "the worth of a failure is -1; give a number"),
         (("--refine", "1", "--search-worth", "nan"), "the worth of a failure is nan; give a"),

@@ -10,9 +10,10 @@ import pytest
 
 from sarl_core import Demonstrations, load_demonstrations
 from sarl_core.demonstrations.dataset import with_formulas
-from sarl_core.improving import refinement
+from sarl_core.improving import policy_improvement, refinement
 from sarl_core.improving.candidate import Candidate, Evaluator
 from sarl_core.improving.movement import POPULATION, Movement, ranks
+from sarl_core.improving.policy_improvement import PolicyImprovement
 from sarl_core.improving.refinement import Refinement, refinement_cost, refinement_seeds
 from sarl_core.improving.shapes import MetStates, neighbours
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
@@ -400,6 +401,39 @@ def test_what_achieves_more_is_told_and_gone_on_with(moved, small_search, monkey
     assert third[1] is best
     assert fourth[1] is best
     assert told == marks == ([begun.start, second[0], fourth[0]] if moved else [begun.start])
+
+
+@pytest.mark.parametrize("starts", [(), (3, 4, 5)])
+def test_in_steps_rules_are_changed_by_what_their_episodes_say(
+    starts, sized_search, monkeypatch
+) -> None:
+    sized_search(population=4, _EARLY=1, _LATE=1, _MET=1, _COMPARED=4, _SHAPES=2)
+    for name, batches in (("_FIRST_BATCHES", 100), ("_BATCHES", 100)):
+        monkeypatch.setattr(policy_improvement, name, batches)
+    asked: list[object] = []
+    monkeypatch.setattr(refinement, "neighbours", lambda *_, **__: asked.append(1))
+    proposed: list[int] = []
+    proposals = PolicyImprovement.proposals
+
+    def counted(self, pairs):
+        found = proposals(self, pairs)
+        proposed.append(len(found))
+        return found
+
+    monkeypatch.setattr(PolicyImprovement, "proposals", counted)
+    others = [grow_budgeted_trees(CARTPOLE, max_rules=rules) for rules in starts]
+    begun = search(*others, episodes=2, steps=2)
+    ticks: list[tuple[int, int]] = []
+    marks = begun.run(2, progress=lambda done, total: ticks.append((done, total)) or True)
+    planned = refinement_cost(2, 2, 1 + len(starts), steps=2)
+    assert ticks[-1] == (planned, planned)
+    assert ticks == sorted(ticks)
+    assert not asked  # the expert's wishes lead nowhere then
+    # Of four starts two are moved a step each before the first turn; of one alone, none is.
+    assert len(proposed) == 2 * 2 + (2 if starts else 0)
+    assert sum(proposed) > 0
+    best = max(mean_return(leaf_rules(one.trees(CARTPOLE, 2))) for one in marks)
+    assert best > mean_return(leaf_rules(begun.start.trees(CARTPOLE, 2))) - 5
 
 
 def test_the_seeds_of_a_turn_are_counted() -> None:
