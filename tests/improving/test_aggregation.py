@@ -216,7 +216,10 @@ def test_the_card_says_how_the_rules_came_about(found, tmp_path):
         ({"turns": -1}, "the number of turns is -1"),
         ({"turns": 1, "search_episodes": 0}, "the number of search episodes is 0"),
         ({"turns": 1, "search_episodes": 10**9}, "give 1,000 or fewer"),
-        ({"turns": 1, "rounds": 400, "search_episodes": 1_000}, "give fewer rounds or"),
+        (
+            {"turns": 1, "rounds": 400, "search_episodes": 1_000},
+            "give fewer rounds, --search-steps or",
+        ),
         ({"turns": 1, "search_limit": 0}, "the limit of a search episode is 0"),
         ({"seed": -1}, "the seed is -1"),
     ],

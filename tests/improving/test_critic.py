@@ -23,9 +23,17 @@ def experience(episodes: list[list[tuple[float, tuple[int, ...], float]]], *, cu
     )
 
 
-def learned(shown: Experience, said, labels=(2,), *, discount: float, trace: float) -> Critic:
+def learned(
+    shown: Experience,
+    said,
+    labels=(2,),
+    *,
+    discount: float,
+    trace: float,
+    batches: int = BATCHES,
+) -> Critic:
     critic = Critic(labels, Horizon(discount, trace), seed=0)
-    critic.learn(shown, np.asarray(said).reshape(len(shown), -1), BATCHES)
+    critic.learn(shown, np.asarray(said).reshape(len(shown), -1), batches)
     return critic
 
 
@@ -77,7 +85,8 @@ def test_what_a_limit_of_time_ended_would_have_gone_on() -> None:
     other = [(0.5, (0,), 1.0)] * 3  # so that returns differ
     for cut, most in ((True, np.inf), (False, 7.5)):
         shown = experience([walk, other] * 20, cut=cut)
-        critic = learned(shown, np.zeros(len(shown), dtype=int), discount=0.9, trace=0.9)
+        said = np.zeros(len(shown), dtype=int)
+        critic = learned(shown, said, discount=0.9, trace=0.9, batches=3 * BATCHES)
         (found,) = values(critic, 0.5)
         assert found[0, 0] < most
         if cut:  # 1 + 0.9 + 0.81 + ...

@@ -408,6 +408,8 @@ def test_in_steps_rules_are_changed_by_what_their_episodes_say(
     starts, sized_search, monkeypatch
 ) -> None:
     sized_search(population=4, _EARLY=1, _LATE=1, _MET=1, _COMPARED=4, _SHAPES=2)
+    for name, times in (("_DEVIATED", 3), ("_FOLLOWED", 2), ("_PROPOSED", (1, 4))):
+        monkeypatch.setattr(refinement, name, times)
     for name, batches in (("_FIRST_BATCHES", 100), ("_BATCHES", 100)):
         monkeypatch.setattr(policy_improvement, name, batches)
     asked: list[object] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Literal
 
@@ -62,6 +63,7 @@ from sarl_dashboard.views.thresholds.moves import (
 from sarl_dashboard.views.thresholds.numbers import show_numbers
 from sarl_dashboard.views.thresholds.recommendation import show_recommendation
 
+_A_FRAME = 0.02  # seconds
 _SETTLED = "That of these trees was settled when they were mined."
 _TOO_LOW = ". The trees of this file do not reach so far down; mine its steps again with less"
 _SHORT = {COMPACT: "Compact", COMBINED: "Two features", FEWEST: "Fewest"}
@@ -104,13 +106,50 @@ def show_controls(
     """
     take_over()
     thresholds = chosen_thresholds()
+    both = thresholds.never is not None and thresholds.demands
+    # What the sliders are moved for is sent first, and drawn before the rest comes: a browser that
+    # is sent more meanwhile draws all at once.
+    sliders = st.container(key="sliders")
+    point = display.point(thresholds)
+    everything = display.dimension is None
+    show_numbers(
+        point,
+        cross_fitting.judged(thresholds) if everything else None,
+        display.trees[0] if display.compact is None else None,
+    )
+    upwards = thresholds.confidence if thresholds.demands else thresholds.never or 0.0
+    across, down = mark_place(landscape, thresholds.support, upwards)
+    ring = "block" if display.compact is None else "none"
+    st.html(placed("maps", across=f"{across:.5f}", down=f"{down:.5f}", ring=ring))
+    time.sleep(_A_FRAME)
+    with sliders:
+        show_sliders(display, thresholds, alone=table is not None and not display.surfaces)
+    stay_beside()
+    demonstrations = chosen_demonstrations()
+    if both and display.compact is None and demonstrations is not None:
+        say_of_sample("Coverage, fidelity and freedom", demonstrations)
+    if everything:
+        elsewhere_notice(thresholds, float(point.fidelity[0, 0]))
+    if thresholds.never is None:
+        show_recommendation(display, thresholds)
+    if table is not None:
+        with table.container():
+            show_largest(display, thresholds, int(point.rule_count[0, 0]))
+
+
+def show_sliders(display: Display, thresholds: Thresholds, *, alone: bool) -> None:
+    """What thresholds are moved by, and named settings.
+
+    Args:
+        display: What is looked at.
+        thresholds: Those in force, or set aside.
+        alone: Whether nothing beside the fragment follows a move.
+    """
     # A callback that asks for more than this fragment costs a run; most moves need none.
-    alone = table is not None and not display.surfaces
     moved: Callable[[], None] | Literal["rerun"] = (
         leave_compact if not rule_base.at_thresholds() else "rerun" if alone else follow
     )
     jumps = None if display.forbids else neat_jumps(display.trees, thresholds)
-    both = thresholds.never is not None and thresholds.demands
     left, middle, right = st.columns([4, 4, 3])
     with left:
         st.select_slider(
@@ -157,32 +196,10 @@ def show_controls(
                 on_change=leave_compact,
                 help=word_help("divider"),
             )
-        if both:
+        if thresholds.never is not None and thresholds.demands:
             epsilon_slider(moved)
         elif not display.forbids:
             named_settings(thresholds, rule_base.compact_name() if display.compact else None)
-    stay_beside()
-    point = display.point(thresholds)
-    everything = display.dimension is None
-    show_numbers(
-        point,
-        cross_fitting.judged(thresholds) if everything else None,
-        display.trees[0] if display.compact is None else None,
-    )
-    demonstrations = chosen_demonstrations()
-    if both and display.compact is None and demonstrations is not None:
-        say_of_sample("Coverage, fidelity and freedom", demonstrations)
-    if everything:
-        elsewhere_notice(thresholds, float(point.fidelity[0, 0]))
-    if thresholds.never is None:
-        show_recommendation(display, thresholds)
-    upwards = thresholds.confidence if thresholds.demands else thresholds.never or 0.0
-    across, down = mark_place(landscape, thresholds.support, upwards)
-    ring = "block" if display.compact is None else "none"
-    st.html(placed("maps", across=f"{across:.5f}", down=f"{down:.5f}", ring=ring))
-    if table is not None:
-        with table.container():
-            show_largest(display, thresholds, int(point.rule_count[0, 0]))
 
 
 def epsilon_slider(moved: Callable[[], None] | Literal["rerun"]) -> None:
