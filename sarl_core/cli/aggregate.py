@@ -145,8 +145,8 @@ def aggregate(
         typer.Option(
             "--search-steps",
             help="With --refine: change the rules in so many steps a turn by what their own "
-            "episodes say of each label, in place of what the expert says. Fewer episodes lead "
-            "few rules further so; 8 is a good number.",
+            "episodes say of each label, in place of what the expert says. Weak rules come further "
+            "so in as many episodes; 8 is a good number.",
         ),
     ] = 0,
     search_worth: Annotated[

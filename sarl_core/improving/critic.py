@@ -157,9 +157,10 @@ class Critic:
     def _value(
         self, inputs: NDArray[np.float32], labels: NDArray[np.int64], index: int
     ) -> NDArray[np.float64]:
-        predicted: NDArray[np.float64] = self._networks[index].predict(
-            self._with_label(inputs, labels, index)
-        )
+        network = self._networks[index]
+        if not hasattr(network, "coefs_"):  # it has never seen the others follow the rules
+            return np.zeros(len(inputs))
+        predicted: NDArray[np.float64] = network.predict(self._with_label(inputs, labels, index))
         return predicted.astype(np.float64) * self._unit
 
     def _targets(

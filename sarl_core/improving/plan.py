@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import get_args
 
@@ -22,6 +21,7 @@ from sarl_core.rollouts.seeds import (
 from sarl_core.shielding.projection import Projection
 
 _MOST_SEARCH_EPISODES = 1_000
+_MOST_WORTH = 1e9
 
 
 @dataclass(frozen=True)
@@ -105,9 +105,10 @@ class Plan:
             ("max_steps", _or_one(self.max_steps), 1, None),
         ):
             _check_number(name, value, least, most)
-        if self.search_worth is not None and not 0 <= self.search_worth < math.inf:
+        if self.search_worth is not None and not 0 <= self.search_worth <= _MOST_WORTH:
             raise InputError(
-                f"the worth of a failure is {self.search_worth:g}; give a number of 0 or more"
+                f"the worth of a failure is {self.search_worth:g}; give a number from 0 to "
+                f"{_MOST_WORTH:g}"
             )
         _check_number("number of turns", self.turns, 0, self._most_turns())
 

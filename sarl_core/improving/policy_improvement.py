@@ -155,10 +155,12 @@ class PolicyImprovement:
                 np.column_stack(labels),
                 rewards,
                 last=last,
-                open=last & played.truncated[table.episode],
+                open=last & (played.truncated & ~played.terminated)[table.episode],
             )
         )
-        while sum(map(len, self._parts)) > _MOST_STEPS and len(self._parts) > 1:
+        # The last two stay, however long they are: only where actions deviate it is seen what
+        # another label brings.
+        while sum(map(len, self._parts)) > _MOST_STEPS and len(self._parts) > 2:
             del self._parts[0]
 
     def proposals(self, pairs: Demonstrations) -> list[Candidate]:
@@ -171,12 +173,16 @@ class PolicyImprovement:
         Returns:
             Up to `MOST_PROPOSALS` trees, no two of which say the same in all these states.
         """
-        self._learn()
+        from threadpoolctl import threadpool_limits
+
+        # Small products: a second thread costs more than it brings, and may round otherwise.
+        with threadpool_limits(1):
+            self._learn()
+            valued = [critic.values(pairs.raw_observations) for critic in self._critics]
         states = pairs.observations
         said = _said(self.here.structures, states)
         result, known = [], {said.tobytes()}
-        for critic in self._critics:
-            values = critic.values(pairs.raw_observations)
+        for values in valued:
             for share in _SHARES:
                 priced = [
                     ScoredStates(states, _priced(value, labels, share))
@@ -193,15 +199,11 @@ class PolicyImprovement:
         return result
 
     def _learn(self) -> None:
-        from threadpoolctl import threadpool_limits
-
         experience = Experience.joined(self._parts)
         extension = Extension(self._observed, [one.definition for one in self.here.derived])
         said = _said(self.here.structures, extension.many(experience.observations))
-        # Small products: a second thread costs more than it brings, and may round otherwise.
-        with threadpool_limits(1):
-            for critic in self._critics:
-                critic.learn(experience, said, self._batches)
+        for critic in self._critics:
+            critic.learn(experience, said, self._batches)
         self._batches = _BATCHES
 
     def _changed(self, priced: Sequence[ScoredStates]) -> list[TreeStructure]:

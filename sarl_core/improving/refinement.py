@@ -38,7 +38,7 @@ from sarl_core.mining.tree import PolicyTree
 from sarl_core.processes import executor_of
 from sarl_core.progress import Progress, report
 from sarl_core.rollouts.episodes import MAX_STEPS, Episodes, rollout
-from sarl_core.rollouts.player import check_environment, shield_for
+from sarl_core.rollouts.player import check_environment
 from sarl_core.shielding.shield import Shield
 
 _LONG = 0.9  # quantile of the expert's lengths
@@ -49,6 +49,7 @@ _NEIGHBOURS = 80  # in shape
 _SHAPES = 4  # that are moved: which has most in it is not seen before
 _STARTS = 8  # of which one is moved before the first turn, `_SHAPES` at least
 _EARLY = 4  # generations for each of them before the worse half is left, then twice as many, ...
+_EARLY_STEPS = 1  # or so many steps
 _LATE = 16  # further ones for the best
 
 # Times the episodes of a neighbour:
@@ -63,9 +64,12 @@ _BEFORE = 2  # times as many of either, before the first step
 _PROPOSED = (3, 24)  # for what is proposed, before the worse half is left, and for the best
 
 
-def _halvings(ways: int) -> list[tuple[int, int]]:
-    """How many ways are gone on with before each halving, of so many, and how far each."""
-    stages, generations = [], _EARLY
+def _halvings(ways: int, steps: int) -> list[tuple[int, int]]:
+    """How many ways are gone on with before each halving, of so many, and how far each.
+
+    A step takes about as many episodes as eight generations.
+    """
+    stages, generations = [], _EARLY_STEPS if steps else _EARLY
     while ways > 1:
         stages.append((ways, generations))
         ways, generations = (ways + 1) // 2, 2 * generations
@@ -100,7 +104,7 @@ def refinement_cost(
     def halved(ways: int) -> int:
         return sum(
             left * (generations * (step if steps else POPULATION * episodes) + _RANKED * episodes)
-            for left, generations in _halvings(ways)
+            for left, generations in _halvings(ways, steps)
         )
 
     met, compared = _MET * episodes, 2 * _COMPARED * episodes
@@ -130,7 +134,9 @@ def refinement_seeds(
 
     def halved(ways: int) -> int:
         each = step if steps else 1
-        return sum(left * generations * each + _RANKED for left, generations in _halvings(ways))
+        return sum(
+            left * generations * each + _RANKED for left, generations in _halvings(ways, steps)
+        )
 
     ways = _ways_of(starts, moved)
     before = ways * _BEFORE * played if steps else 0
@@ -304,7 +310,8 @@ class Refinement:
             ways = [self._movement(shape, met) for shape in self._shapes(met)]
         if ways:
             changed = ways[self._halved(ways, met)]
-            if self._is_as_good(changed.here, self.here, met):
+            is_other = changed.here is not self.here
+            if is_other and self._is_as_good(changed.here, self.here, met):
                 self._go_on(changed)
                 met = self._met() if self._steps else met
         # What it has learned of the way serves on.
@@ -330,7 +337,7 @@ class Refinement:
         not moved here: there is nothing to choose.
         """
         left: Sequence[int] = range(len(ways))
-        for _, generations in _halvings(len(ways)):
+        for _, generations in _halvings(len(ways), self._steps):
             for place in left:
                 self._advance(ways[place], generations, met)
             moved = [ways[place].here for place in left]
@@ -471,9 +478,9 @@ class Refinement:
     def _deviate(self, way: PolicyImprovement) -> None:
         """Show it what single other actions bring."""
         env_id = self._evaluator.env_id
-        shield = shield_for(env_id, self._shield(way.here))
-        adapter = check_environment(env_id, None).adapter
-        agent = DeviatingAgent(shield, self._dimensions, adapter)
+        ready = check_environment(env_id, self._shield(way.here))
+        assert ready.shield is not None
+        agent = DeviatingAgent(ready.shield, self._dimensions, ready.adapter)
         way.add(self._play(agent, None, _DEVIATED))
 
     def _move(

@@ -235,15 +235,20 @@ def test_a_failure_is_counted_where_it_ends_an_episode(monkeypatch) -> None:
     np.testing.assert_array_equal(parts[0.0].rewards, shown.steps.reward)
 
 
-def test_the_latest_steps_are_learned_from(monkeypatch) -> None:
+def test_the_latest_steps_are_learned_from_and_of_both_kinds(monkeypatch) -> None:
+    """However long the episodes are in which no action deviates."""
     monkeypatch.setattr(policy_improvement, "_MOST_STEPS", 150)
-    shown = played("CartPole-v1", "novice", None, 4)
     pairs = load_demonstrations(DATA / "cartpole.parquet").select(range(2))
+    followed = played("CartPole-v1", "expert", None, 2)
+    deviating = played("CartPole-v1", "novice", None, 4)
     way = PolicyImprovement(
         HERE, label_dimensions(pairs, 2), observed=4, max_rules=2, worth=0.0, seed=0
     )
-    for _ in range(8):
-        way.add(shown)
-    kept = -(-150 // len(shown.steps.episode))
-    assert len(way._parts) in {max(kept - 1, 1), kept}
-    assert len(way._parts) < 5
+    for _ in range(3):
+        way.add(deviating)
+        way.add(followed)
+    assert len(followed.steps.episode) > 150
+    assert list(map(len, way._parts)) == [
+        len(deviating.steps.episode),
+        len(followed.steps.episode),
+    ]
