@@ -425,6 +425,7 @@ def test_in_steps_rules_are_changed_by_what_their_episodes_say(
     monkeypatch.setattr(PolicyImprovement, "proposals", counted)
     others = [grow_budgeted_trees(CARTPOLE, max_rules=rules) for rules in starts]
     begun = search(*others, episodes=2, steps=2)
+    begun._evaluator = replace(TRIAL, max_steps=150)
     ticks: list[tuple[int, int]] = []
     marks = begun.run(2, progress=lambda done, total: ticks.append((done, total)) or True)
     planned = refinement_cost(2, 2, 1 + len(starts), steps=2)
@@ -435,7 +436,7 @@ def test_in_steps_rules_are_changed_by_what_their_episodes_say(
     assert len(proposed) == 2 * 2 + (2 if starts else 0)
     assert sum(proposed) > 0
     last = mean_return(leaf_rules(marks[-1].trees(CARTPOLE, 2)))
-    assert last > mean_return(leaf_rules(begun.start.trees(CARTPOLE, 2)))
+    assert last > mean_return(leaf_rules(grow_budgeted_trees(CARTPOLE, max_rules=2)))
 
 
 def test_the_seeds_of_a_turn_are_counted() -> None:
