@@ -58,7 +58,7 @@ class Experience:
         return len(self.rewards)
 
     @classmethod
-    def joined(cls, parts: Sequence[Experience]) -> Experience:
+    def join(cls, parts: Sequence[Experience]) -> Experience:
         """One after the other."""
         return cls(
             np.concatenate([part.observations for part in parts]),

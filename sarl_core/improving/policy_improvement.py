@@ -199,7 +199,7 @@ class PolicyImprovement:
         return result
 
     def _learn(self) -> None:
-        experience = Experience.joined(self._parts)
+        experience = Experience.join(self._parts)
         extension = Extension(self._observed, [one.definition for one in self.here.derived])
         said = _said(self.here.structures, extension.many(experience.observations))
         for critic in self._critics:

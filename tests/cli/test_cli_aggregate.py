@@ -75,6 +75,7 @@ def test_without_an_expert_the_gaps_are_written(run, tmp_path):
         ),
         (("--search-worth", "9"), "--search-worth is about a refinement"),
         (("--refine", "1", "--search-worth", "-1"), "the worth of a failure is -1; give a number"),
+        (("--refine", "1", "--search-worth", "1e200"), "give a number from 0 to 1e+09"),
         (("--refine", "1", "--search-worth", "nan"), "the worth of a failure is nan; give a"),
         (("--refine", "1", "--search-limit", "0"), "the limit of a search episode is 0"),
         (("--expert", "novice"), "acts at random"),

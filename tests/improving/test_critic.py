@@ -106,6 +106,15 @@ def test_a_dimension_is_judged_where_the_others_do_as_they_are_told() -> None:
     assert second[0, :2] == pytest.approx([1, -20], abs=3)
 
 
+def test_of_a_dimension_that_never_stood_alone_nothing_is_known() -> None:
+    """The second always did otherwise than it is told: of the first no label is worth more."""
+    shown = experience([[(0.0, (label, 1), 5.0 * label)] for label in (0, 1)] * 40)
+    critic = learned(shown, np.zeros((80, 2), dtype=int), (2, 2), discount=0.9, trace=0.9)
+    first, second = values(critic, 0.0)
+    np.testing.assert_array_equal(first, [[0.0, 0.0]])
+    assert second[0, 1] != 0
+
+
 def test_features_of_any_size_and_none_at_all_are_learned_from() -> None:
     generator = np.random.default_rng(1)
     sizes = np.array([1e6, 1e-6, 0.0], dtype=np.float32)

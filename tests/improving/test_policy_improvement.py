@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -60,7 +61,7 @@ def known(monkeypatch: pytest.MonkeyPatch, worth: np.ndarray) -> list[np.ndarray
     monkeypatch.setattr(
         Critic, "learn", lambda self, experience, labels, batches: learned.append(labels)
     )
-    monkeypatch.setattr(policy_improvement.Experience, "joined", lambda parts: _shown())
+    monkeypatch.setattr(policy_improvement.Experience, "join", lambda parts: _shown())
     return learned
 
 
@@ -178,13 +179,7 @@ def test_rules_come_to_balance_the_pole_by_episodes_alone(monkeypatch) -> None:
     monkeypatch.setattr(policy_improvement, "_FIRST_BATCHES", 600)
     monkeypatch.setattr(policy_improvement, "_BATCHES", 200)
     pairs = load_demonstrations(DATA / "cartpole.parquet").select(range(4))
-    angle = TreeStructure(
-        feature=np.array([2, LEAF, LEAF]),
-        threshold=np.array([0.0, 0.0, 0.0]),
-        children_left=np.array([1, LEAF, LEAF]),
-        children_right=np.array([2, LEAF, LEAF]),
-        label=np.array([0, 0, 1]),
-    )
+    angle = replace(TREE, feature=np.array([2, LEAF, LEAF]))
     way = PolicyImprovement(
         Candidate.of([angle], [], observed=4),
         label_dimensions(pairs, 2),
@@ -233,6 +228,19 @@ def test_a_failure_is_counted_where_it_ends_an_episode(monkeypatch) -> None:
     assert parts[0.0].last.sum() == 6
     np.testing.assert_array_equal(less, 50.0 * parts[0.0].last)
     np.testing.assert_array_equal(parts[0.0].rewards, shown.steps.reward)
+
+
+def test_an_episode_that_ends_on_its_last_step_is_over() -> None:
+    """Where the limit of time is reached as it ends, nothing would have followed."""
+    shown = played("CartPole-v1", "novice", None, 3)
+    assert shown.terminated.all()
+    pairs = load_demonstrations(DATA / "cartpole.parquet").select(range(2))
+    way = PolicyImprovement(
+        HERE, label_dimensions(pairs, 2), observed=4, max_rules=2, worth=0.0, seed=0
+    )
+    way.add(replace(shown, truncated=np.array([True, True, True])))
+    way.add(replace(shown, terminated=np.zeros(3, bool), truncated=np.array([True, False, True])))
+    assert [int(part.open.sum()) for part in way._parts] == [0, 2]
 
 
 def test_the_latest_steps_are_learned_from_and_of_both_kinds(monkeypatch) -> None:
