@@ -8,6 +8,7 @@ deep link.
 from __future__ import annotations
 
 import atexit
+import gc
 import sys
 from contextlib import ExitStack
 from importlib import import_module
@@ -21,6 +22,11 @@ from sarl_core.files import temporary_folder
 from sarl_dashboard import providers
 from sarl_dashboard.serving.log_lines import write_json_lines
 from sarl_dashboard.serving.routes import routes
+
+# What libraries consist of stays for good. To look for garbage among it, again and again while more
+# of it is loaded, takes a tenth of a start.
+gc.freeze()
+gc.disable()
 
 write_json_lines()
 try:
@@ -37,7 +43,15 @@ atexit.register(_while_it_runs.close)
 _PAGES = Path(__file__).parent / "pages"
 sys.path.append(str(_PAGES))
 
-# Importing what grows trees takes as long as a browser takes to begin.
-Thread(target=import_module, args=("sklearn.tree",), daemon=True).start()
+
+def _load() -> None:
+    """Load what grows trees, which takes as long as a browser takes to begin."""
+    try:
+        import_module("sklearn.tree")
+    finally:
+        gc.enable()
+
+
+Thread(target=_load, daemon=True).start()
 
 app = st.App(_PAGES / "_router.py", routes=routes())

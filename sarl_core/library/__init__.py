@@ -1,7 +1,9 @@
-"""What is kept: demonstrations, rule sets, results and notes, each with where it came from."""
+"""What is kept: demonstrations, rule sets, results and notes, each with where it came from.
 
-from sarl_core.explaining.words.sign_off import Approval
-from sarl_core.library.items import Item, ItemFile
-from sarl_core.library.library import Library, Quota, Usage
+Names are loaded when they are first used: most of what works with a library needs no database to be
+loaded. They stand in `__init__.pyi`.
+"""
 
-__all__ = ["Approval", "Item", "ItemFile", "Library", "Quota", "Usage"]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

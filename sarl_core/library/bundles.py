@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import msgspec
 
@@ -19,8 +19,10 @@ from sarl_core.explaining.words.sign_off import Approval
 from sarl_core.files import as_path, whole_file
 from sarl_core.library.contents import digest_of_files
 from sarl_core.library.items import UNLISTED, Item, ItemFile, Kind
-from sarl_core.library.library import Library
 from sarl_core.limits import limited_bytes, require_memory
+
+if TYPE_CHECKING:
+    from sarl_core.library.library import Library
 
 ENDING = ".sarl"
 _LIST = "bundle.json"

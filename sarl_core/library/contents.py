@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from hashlib import blake2b
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import (
@@ -17,9 +18,7 @@ from sarl_core.demonstrations.formats import (
 from sarl_core.errors import InputError, SarlError, quoted
 from sarl_core.explaining.words.sign_off import SignOff, sign_off_of
 from sarl_core.library.annotations import annotated, is_annotated
-from sarl_core.library.database import is_there
 from sarl_core.library.items import Item, Kind
-from sarl_core.library.library import Library
 from sarl_core.library.logs import log_content, log_file_name, log_roles, read_log
 from sarl_core.library.place import place_of
 from sarl_core.limits import limited_bytes
@@ -34,6 +33,9 @@ from sarl_core.mining.distributed.mined_files import (
 from sarl_core.mining.editing.edit_files import edits_from_json, edits_to_json
 from sarl_core.mining.editing.edits import Edit
 from sarl_core.mining.rule_set import RuleSet, rules_digest, rules_from_json
+
+if TYPE_CHECKING:
+    from sarl_core.library.library import Library
 
 MAIN_FILES = {"demonstrations": ".parquet", "rules": ".json"}
 """Roles of the files that are demonstrations and rules, and their endings."""
@@ -356,6 +358,9 @@ def sign_off_at_hand(rule_set: RuleSet) -> SignOff:
         SarlError: If there is one and it cannot be read.
         OSError: If its place cannot be looked into.
     """
+    from sarl_core.library.database import is_there
+    from sarl_core.library.library import Library
+
     place = place_of()
     if not is_there(place):
         return SignOff()

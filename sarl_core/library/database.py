@@ -116,7 +116,7 @@ def is_there(place: LibraryPlace) -> bool:
         WorkError: If the database cannot be reached.
     """
     if place.is_folder:
-        return place.database_file.is_file()
+        return not place.is_new
     engine = _engine(place)
     try:
         with _in_words(place.said), engine.connect() as connection:

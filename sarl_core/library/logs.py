@@ -7,15 +7,18 @@ import re
 from collections.abc import Mapping, Sequence
 from hashlib import blake2b
 from pathlib import PurePath
+from typing import TYPE_CHECKING
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import ColumnRole, read_demonstrations
 from sarl_core.demonstrations.formats.mapping.roles import as_roles
 from sarl_core.errors import InputError, quoted
 from sarl_core.library.items import Item
-from sarl_core.library.library import Library
 from sarl_core.library.results import standing_ids
 from sarl_core.limits import limited_bytes
+
+if TYPE_CHECKING:
+    from sarl_core.library.library import Library
 
 _LOG, _COLUMNS, _FILE_NAME = "log", "columns", "file_name"
 _ENDING = re.compile(r"\.[a-z0-9]{1,12}")

@@ -36,6 +36,11 @@ class LibraryPlace:
         return self.address.startswith("sqlite")
 
     @property
+    def is_new(self) -> bool:
+        """Whether it is a folder in which nothing was ever kept; nothing is made by looking."""
+        return self.is_folder and not self.database_file.is_file()
+
+    @property
     def database_file(self) -> Path:
         """The file of the database, where it is one."""
         return self.folder.absolute() / _DATABASE

@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sarl_core.documents import parse_json
 from sarl_core.errors import InputError, quoted
@@ -17,10 +18,12 @@ from sarl_core.explaining.words.certificate import certificate_facts, verdict_te
 from sarl_core.files import as_path
 from sarl_core.library.file_store import content_digest
 from sarl_core.library.items import Item
-from sarl_core.library.library import Library
 from sarl_core.limits import limited_bytes
 from sarl_core.studies.certificate import Certificate
 from sarl_core.studies.certificate_files import FORMAT, certificate_from
+
+if TYPE_CHECKING:
+    from sarl_core.library.library import Library
 
 RESULT_ENDINGS = (".csv", ".gif", ".html", ".json", ".mp4", ".png")
 NOTE_ENDINGS = (".md", ".txt")

@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from threading import Lock
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import streamlit as st
 
@@ -17,7 +17,6 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.formats import ColumnRole
 from sarl_core.demonstrations.shared import in_shared_memory
 from sarl_core.errors import InputError, SarlError, quoted
-from sarl_core.library import Item, Library
 from sarl_core.library.contents import (
     add_demonstrations,
     add_edits,
@@ -28,7 +27,7 @@ from sarl_core.library.contents import (
     rules_of,
 )
 from sarl_core.library.file_store import content_digest
-from sarl_core.library.items import Kind, as_id
+from sarl_core.library.items import Item, Kind, as_id
 from sarl_core.library.logs import add_log
 from sarl_core.library.place import LibraryPlace, place_of, usual_author
 from sarl_core.library.results import add_result
@@ -41,6 +40,9 @@ from sarl_core.rollouts.episodes import Episodes
 from sarl_dashboard import session
 from sarl_dashboard.cache import cached
 from sarl_dashboard.text import digest_of
+
+if TYPE_CHECKING:
+    from sarl_core.library import Library
 
 _AMOUNT: dict[Kind, str] = {"episodes": "episodes", "improvement": "rounds", "study": "runs"}
 """How details call how much of some work is finished."""
@@ -55,6 +57,9 @@ def library() -> Library:
     Raises:
         SarlError: If it cannot be opened.
     """
+    # Loading what reads a database takes a third of a second, which a first look need not wait for.
+    from sarl_core.library import Library
+
     place = place_of()
     with _LOCK:
         if place not in _OPENED:
@@ -87,16 +92,17 @@ def is_id(text: str) -> bool:
 
 def own_demonstrations() -> list[Item]:
     """The demonstrations in a visitor's list, the newest first; [] where there is no library."""
-    try:
-        return library().items(author(), kind="demonstrations")
-    except SarlError:
-        return []
+    return _own("demonstrations")
 
 
 def own_rules() -> list[Item]:
     """The rule sets in a visitor's list, the newest first; [] where there is no library."""
+    return _own("rules")
+
+
+def _own(kind: Kind) -> list[Item]:
     try:
-        return library().items(author(), kind="rules")
+        return [] if place_of().is_new else library().items(author(), kind=kind)
     except SarlError:
         return []
 

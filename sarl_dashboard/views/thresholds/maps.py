@@ -18,7 +18,7 @@ from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.moves import take_click
 
 BARE = {"displayModeBar": False, "scrollZoom": False}
-_A_FEW_FRAMES = 0.15  # seconds
+_A_FEW_FRAMES = 0.4  # seconds; what is sent sooner is drawn with the maps, a second or two later
 
 
 def let_numbers_be_drawn() -> None:
