@@ -56,6 +56,19 @@ def test_the_interval_covers_the_truth_about_as_often_as_it_says() -> None:
     assert 88 <= hits <= 99
 
 
+def test_of_many_values_a_formula_says_what_resampling_says() -> None:
+    rng = np.random.default_rng(0)
+    values = np.where(rng.random(10_001) < 0.1, -100.0, rng.gamma(1.5, 100.0, 10_001))
+    by_formula, resampled = summarise(values), summarise(values[:-1])
+    width = resampled.high - resampled.low
+    assert by_formula.low == pytest.approx(resampled.low, abs=0.1 * width)
+    assert by_formula.high == pytest.approx(resampled.high, abs=0.1 * width)
+    # No resampling: another seed is no other interval.
+    assert summarise(values, seed=1) == by_formula != summarise(values[:-1], seed=1)
+    mostly = summarise(np.r_[np.arange(2_000.0) / 10, np.full(9_000, 500.0)])
+    assert (mostly.low, mostly.iqm, mostly.high) == (500.0, 500.0, 500.0)
+
+
 def test_same_seed_same_interval() -> None:
     values = np.random.default_rng(0).normal(size=30)
     assert summarise(values, seed=1) == summarise(values, seed=1)

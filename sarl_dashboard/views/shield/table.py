@@ -179,9 +179,7 @@ def column_config(env_id: str) -> dict[str, Any]:
         "Typical return": column.NumberColumn(
             format="%.1f", help="Mean of the middle half of the episodes (IQM)"
         ),
-        "95 % interval": column.TextColumn(
-            alignment="right", help="Of the typical return, by bootstrap"
-        ),
+        "95 % interval": column.TextColumn(alignment="right", help="Of the typical return"),
         "Mean return": column.NumberColumn(format="%.1f", help="Of all episodes"),
         "Changed": column.TextColumn(
             alignment="right", help="Share of the steps at which the shield changed the action"
