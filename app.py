@@ -23,8 +23,8 @@ from sarl_dashboard import providers
 from sarl_dashboard.serving.log_lines import write_json_lines
 from sarl_dashboard.serving.routes import routes
 
-# What libraries consist of stays for good. To look for garbage among it, again and again while more
-# of it is loaded, takes a tenth of a start.
+# What libraries consist of stays for good. To look for garbage among it, again and again until the
+# last of them is loaded, takes a tenth of a start.
 gc.freeze()
 gc.disable()
 
@@ -45,7 +45,7 @@ sys.path.append(str(_PAGES))
 
 
 def _load() -> None:
-    """Load what grows trees, which takes as long as a browser takes to begin."""
+    """Load what grows trees, as long as a browser takes to begin; then look for garbage again."""
     try:
         import_module("sklearn.tree")
     finally:

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import sarl_core
+import sarl_core.library
 
 ROOT = Path(__file__).resolve().parents[1]
 LEARNERS = {"torch", "stable_baselines3"}
@@ -71,10 +72,15 @@ def test_mining_and_shielding_load_no_learner():
     assert not loaded_after(f"from sarl_core import {names}") & LEARNERS
 
 
-def test_every_public_name_is_there():
-    for name in sarl_core.__all__:
-        assert getattr(sarl_core, name).__name__ == name
-    assert set(sarl_core.__all__) <= set(dir(sarl_core))
+@pytest.mark.parametrize("package", [sarl_core, sarl_core.library])
+def test_every_public_name_is_there(package):
+    for name in package.__all__:
+        assert getattr(package, name).__name__ == name
+    assert package.__all__
+    assert set(package.__all__) <= set(dir(package))
+
+
+def test_an_unknown_name_is_told():
     with pytest.raises(AttributeError, match="nonsense"):
         _ = sarl_core.nonsense
 
@@ -87,6 +93,27 @@ from streamlit.runtime.scriptrunner.exec_code import modified_sys_path
 before = list(sys.path)
 with modified_sys_path("pages/_router.py"):
     assert sys.path == before
+"""
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+def test_a_first_look_loads_no_database(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SARL_LIBRARY", str(tmp_path))
+    looking = "from tests.app.screens import open_page\nopen_page('thresholds')"
+    assert not loaded_after(looking) & {"sqlalchemy", "alembic"}
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("missing", ["", "sys.modules['sklearn'] = None"])
+def test_garbage_is_looked_for_once_the_dashboard_has_begun(missing: str) -> None:
+    code = f"""
+import gc, sys, threading
+{missing}
+import app
+for thread in threading.enumerate():
+    if thread is not threading.main_thread() and thread.daemon:
+        thread.join(60)
+assert gc.isenabled()
 """
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 

@@ -37,7 +37,11 @@ class LibraryPlace:
 
     @property
     def is_new(self) -> bool:
-        """Whether it is a folder in which nothing was ever kept; nothing is made by looking."""
+        """Whether it is a folder in which nothing was ever kept; nothing is made by looking.
+
+        Raises:
+            OSError: If it cannot be looked into.
+        """
         return self.is_folder and not self.database_file.is_file()
 
     @property

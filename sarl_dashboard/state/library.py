@@ -103,7 +103,7 @@ def own_rules() -> list[Item]:
 def _own(kind: Kind) -> list[Item]:
     try:
         return [] if place_of().is_new else library().items(author(), kind=kind)
-    except SarlError:
+    except (SarlError, OSError):
         return []
 
 

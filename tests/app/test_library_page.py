@@ -140,6 +140,16 @@ def test_without_a_library_everything_else_works(place: Path) -> None:
     assert "kept for this visit only" in texts(app)
 
 
+def test_a_place_that_cannot_be_looked_into_leaves_the_lists_empty(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def refused(path: Path) -> bool:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    monkeypatch.setattr(Path, "is_file", refused)  # a folder's mode stops nobody who is root
+    assert state.own_demonstrations() == state.own_rules() == []
+
+
 def test_a_link_opens_one_thing_and_its_author_changes_it() -> None:
     identifier = upload(open_page("demonstrations"))
     app = open_page("library", item=identifier)

@@ -340,17 +340,9 @@ def test_what_is_no_library_is_told_in_a_sentence(tmp_path: Path) -> None:
     assert "secret" not in str(told.value)
 
 
-def test_no_database_is_loaded_for_a_list_in_which_nothing_was_ever_kept(tmp_path: Path) -> None:
+def test_a_folder_is_new_until_there_is_a_library(tmp_path: Path) -> None:
     place = place_of(tmp_path)
     assert place.is_new
-    code = (
-        "import sys\n"
-        "from sarl_dashboard.state.library import own_demonstrations, own_rules\n"
-        "assert own_demonstrations() == own_rules() == []\n"
-        "assert not {'sqlalchemy', 'alembic'} & set(sys.modules)"
-    )
-    variables = os.environ | {"SARL_LIBRARY": str(tmp_path)}
-    subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=variables, check=True)
     assert not list(tmp_path.iterdir())
     Library(place).close()
     assert not place.is_new

@@ -18,16 +18,16 @@ from sarl_dashboard.views.thresholds.display import Display
 from sarl_dashboard.views.thresholds.moves import take_click
 
 BARE = {"displayModeBar": False, "scrollZoom": False}
-_A_FEW_FRAMES = 0.4  # seconds; what is sent sooner is drawn with the maps, a second or two later
+_UNTIL_DRAWN = 0.4  # seconds; if maps follow sooner, slower machines draw the numbers with them
 
 
 def let_numbers_be_drawn() -> None:
     """Wait, at the first visit of a session, until a browser has drawn what it was sent.
 
-    What draws maps takes it more than half a second to read, in which it draws nothing else.
+    What draws maps takes it half a second or two to read, in which it draws nothing else.
     """
     if not st.session_state.setdefault("_numbers_drawn", False):
-        time.sleep(_A_FEW_FRAMES)
+        time.sleep(_UNTIL_DRAWN)
         st.session_state["_numbers_drawn"] = True
 
 
