@@ -8,7 +8,7 @@ import pytest
 from sqlalchemy import create_engine, text
 
 from sarl_core.cli.app import main
-from sarl_core.library import contents
+from sarl_core.library import database
 from tests.cli.conftest import CART, ROOT
 
 RULES = str(ROOT / "data" / "rules" / "cartpole_combined.json")
@@ -92,7 +92,7 @@ def test_a_place_that_may_not_be_looked_into_is_said_to_be_one(monkeypatch, caps
     def forbidden(_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(contents, "is_there", forbidden)
+    monkeypatch.setattr(database, "is_there", forbidden)
     assert main(["audit", RULES, CART]) == 0
     assert "is not known: Permission denied" in capsys.readouterr().err
 
