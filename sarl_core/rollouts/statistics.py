@@ -13,9 +13,7 @@ from sarl_core.errors import InputError
 
 _RESAMPLES = 9_999
 _NUMBERS_AT_ONCE = 2_000_000  # 16 MB; a bootstrap of many episodes is done in pieces
-_MANY = (
-    10_000  # values: of more a bootstrap takes seconds to minutes, and says the same as a formula
-)
+_MANY = 10_000  # values: of more a bootstrap takes seconds to minutes, and says what a formula says
 _WORST = 0.1  # the share of the episodes that are the worst
 _CUT = 0.25  # the share of the values left out at either end
 
