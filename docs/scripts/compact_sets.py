@@ -37,6 +37,7 @@ OPTIONS = {
     "search_limit": "search-limit",
     "search_starts": "search-starts",
     "search_steps": "search-steps",
+    "search_generations": "search-generations",
     "search_worth": "search-worth",
     "validation": "validation",
     "report": "report-episodes",

@@ -84,6 +84,17 @@ def aggregate(
         ),
     ] = "expert",
     normalise: Normalise = None,
+    first_rules: Annotated[
+        Path | None,
+        typer.Option(
+            "--first-rules",
+            metavar="RULES.json",
+            show_default=False,
+            help="The rules of the first round, as this command wrote them: a search is gone on "
+            "with, or rules that a person has changed are searched around. Give another --seed "
+            "than made them: the same one plays the same episodes.",
+        ),
+    ] = None,
     rounds: Annotated[
         int, typer.Option("--rounds", help="How often the rules act and the expert answers.")
     ] = 20,
@@ -149,6 +160,17 @@ def aggregate(
             "so in as many episodes; 8 is a good number.",
         ),
     ] = 0,
+    search_generations: Annotated[
+        int | None,
+        typer.Option(
+            "--search-generations",
+            help="With --refine: in how many generations of 20 neighbours the thresholds of the "
+            "best rules are moved in each turn. Each neighbour plays twice the search episodes, so "
+            "that a hundred generations take long; of more than 16 each leaves its worse half "
+            "after a third of them, and half of the rest after two thirds.",
+            show_default="16",
+        ),
+    ] = None,
     search_worth: Annotated[
         float | None,
         typer.Option(
@@ -186,17 +208,21 @@ def aggregate(
         from sarl_core.environments.description import describe_environment
         from sarl_core.improving.aggregation import recorded_environment
         from sarl_core.improving.plan import Plan
+        from sarl_core.mining.rule_set import load_rules
 
         searches = {
             "episodes": search_episodes,
             "limit": search_limit,
             "starts": search_starts,
             "steps": search_steps or None,
+            "generations": search_generations,
             "worth": search_worth,
         }
         for name, given in searches.items():
             if given is not None and not refine:
                 raise InputError(f"--search-{name} is about a refinement; give --refine, too")
+        if nobody and first_rules is not None:
+            raise InputError("--first-rules are those of a first round; name an expert, too")
         plan = Plan(
             max_rules=max_rules,
             rounds=rounds,
@@ -209,6 +235,7 @@ def aggregate(
             search_limit=search_limit,
             search_starts=search_starts,
             search_steps=search_steps,
+            search_generations=search_generations,
             search_worth=search_worth,
             validation=validation,
             report=report,
@@ -216,6 +243,7 @@ def aggregate(
             max_steps=max_steps,
             choose=choose,
         )
+        first = None if first_rules is None else load_rules(first_rules)
         start = read_demonstrations(files, env, columns, missing)
         environment = env or recorded_environment(start)
         agents = _agents(agent, expert, environment, normalise)
@@ -238,6 +266,7 @@ def aggregate(
             env_id=environment,
             agent=agents[0],
             expert=agents[1],
+            first_rules=first,
             jobs=jobs,
             executor=executor,
             progress=advance,

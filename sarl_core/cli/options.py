@@ -149,7 +149,7 @@ LearnerName = Annotated[
         "--learner",
         help="What grows the trees: exact tries every border between two values; histogram those "
         "between 1,024 bins of a feature, which suits many steps; auto "
-        "is exact up to 50,000 steps, then histogram where that is installed.",
+        "is exact up to 50,000 steps, then histogram.",
     ),
 ]
 EnvArguments = Annotated[

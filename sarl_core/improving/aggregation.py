@@ -24,17 +24,18 @@ from sarl_core.environments.failures import no_failures_text
 from sarl_core.errors import InputError
 from sarl_core.improving.alternation import ScoredStates, achieved, alternated, label_scores
 from sarl_core.improving.candidate import Candidate, Evaluator, structure_of
+from sarl_core.improving.first_rules import check_first_rules, first_trees
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import Answers, ask, importance
 from sarl_core.improving.questions import scores as expert_scores
-from sarl_core.improving.refinement import Refinement, refinement_cost
+from sarl_core.improving.refinement import Refinement
 from sarl_core.improving.successive_halving import planned_episodes, successive_halving
 from sarl_core.mining.algorithm_1 import mine_rules
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.combining.queries import trees_over_used
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.growing.structure import count_tree
-from sarl_core.mining.rule_set import RuleSet
+from sarl_core.mining.rule_set import RuleSet, rules_digest
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rollouts import seeds
@@ -105,6 +106,7 @@ class Aggregation:
         reported: Episodes that nothing was chosen by; None where the run was stopped before.
         demonstrations: All pairs of the chosen round.
         seeds: Which episodes served for what.
+        first_rules: Digest of those that it began with; "" where they were mined.
         fault: Why it was stopped, where agent or expert failed; else "".
     """
 
@@ -119,6 +121,7 @@ class Aggregation:
     reported: Episodes | None
     demonstrations: Demonstrations
     seeds: RunSeeds
+    first_rules: str = ""
     fault: str = ""
 
     @property
@@ -177,6 +180,7 @@ def aggregate(
     env_id: EnvironmentOrId | None = None,
     agent: str | Agent = "novice",
     expert: str | Agent = "expert",
+    first_rules: RuleSet | None = None,
     jobs: int = 1,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -191,6 +195,8 @@ def aggregate(
         agent: Who is shielded, as in `make_agent`.
         expert: Who is asked: a trained policy, or an agent of the caller's own. One with a
             memory is asked about each episode from its start.
+        first_rules: Those of the first round, as another aggregation gave them; mined from `start`
+            where None.
         jobs: Processes; changes the speed, never the result.
         executor: Whose processes they are; this machine's where not given.
         progress: Called with (units done, in all); returning False stops.
@@ -201,8 +207,8 @@ def aggregate(
         that was finished counts: the rounds, the refinement as far as it went, the choice.
 
     Raises:
-        InputError: If agent, expert and environment do not fit, or the expert acts at random; or
-            if failures are to count where nothing says what one is.
+        InputError: If agent, expert and environment do not fit, or the expert acts at random; if
+            failures are to count where nothing says what one is; or if the first rules do not fit.
         CancelledError: If `progress` returned False before the first round was finished.
     """
     env_id = env_id or recorded_environment(start)
@@ -212,8 +218,10 @@ def aggregate(
             f"no failure can count in the search, because {why}; say what a failure is "
             "(--failure), or leave --search-worth out"
         )
+    if first_rules is not None:
+        check_first_rules(first_rules, plan)
     agents = make_agent(agent, env_id), make_agent(expert, env_id)
-    run = _Run(start, plan, env_id, *agents, jobs, executor)
+    run = _Run(start, plan, env_id, *agents, jobs, executor, first_rules)
     clock = _Clock(run.planned_units(), progress)
     try:
         for number in range(1, plan.rounds + 1):
@@ -283,12 +291,18 @@ class _Run:
         expert: Agent,
         jobs: int,
         executor: Executor | None = None,
+        first_rules: RuleSet | None = None,
     ) -> None:
         self.plan, self.env_id, self.jobs, self.executor = plan, env_id, jobs, executor
         self.agent, self.expert = agent, expert
         self.answers = Answers(
             env_id, expert, start, pairs=plan.combined, divider=plan.divider, seed=plan.seed
         )
+        self.first: tuple[PolicyTree, ...] | None = None
+        self.first_rules = ""
+        if first_rules is not None:
+            self.first = first_trees(first_rules, self.answers)
+            self.first_rules = rules_digest(first_rules)
         self.rounds: list[AggregationRound] = []
         self.trees: list[tuple[PolicyTree, ...]] = []
         self.choice: _Choice | None = None
@@ -297,15 +311,7 @@ class _Run:
 
     def planned_units(self) -> int:
         plan = self.plan
-        refined = 0
-        if plan.turns:
-            refined = refinement_cost(
-                plan.turns,
-                plan.search_episodes,
-                plan.rounds,
-                plan.search_starts,
-                plan.search_steps,
-            )
+        refined = plan.search.cost(plan.turns) if plan.turns else 0
         chosen = _choice_cost(plan, _most_choices(plan))
         return plan.rounds * plan.episodes + refined + chosen + plan.report
 
@@ -391,7 +397,8 @@ class _Run:
         return seeds.of_run(first, self.plan.seed)
 
     def round(self, number: int, clock: _Clock) -> None:
-        trees = self.grow(number - 1, clock)
+        trees = self.first if number == 1 else None
+        trees = trees or self.grow(number - 1, clock)
         rules = self.rules(trees)
         played = self.shielded(
             rules,
@@ -472,9 +479,7 @@ class _Run:
             expert=self.expert,
             combined=plan.combined,
             max_rules=plan.max_rules,
-            episodes=plan.search_episodes,
-            moved=plan.search_starts,
-            steps=plan.search_steps,
+            effort=plan.search,
             first=first,
             seed=plan.seed,
             jobs=self.jobs,
@@ -535,6 +540,7 @@ class _Run:
             reported=self.reported,
             demonstrations=pairs,
             seeds=self.seeds,
+            first_rules=self.first_rules,
         )
 
 

@@ -121,12 +121,18 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         "seed": plan.seed,
         **({} if plan.max_steps is None else {"max_steps": plan.max_steps}),
         **({"combined": _combined(aggregation)} if plan.combined else {}),
+        **({"first_rules": aggregation.first_rules} if aggregation.first_rules else {}),
         "episodes_a_round": plan.episodes,
         "turns": plan.turns,
         **({"search_episodes": plan.search_episodes} if plan.turns else {}),
         **({} if plan.search_limit is None else {"search_limit": plan.search_limit}),
         **({} if plan.search_starts is None else {"search_starts": plan.search_starts}),
         **({} if not plan.search_steps else {"search_steps": plan.search_steps}),
+        **(
+            {}
+            if plan.search_generations is None
+            else {"search_generations": plan.search_generations}
+        ),
         **({} if plan.search_worth is None else {"search_worth": plan.search_worth}),
         "rounds": [_round(one) for one in aggregation.rounds],
         "chosen_round": aggregation.chosen,

@@ -166,7 +166,7 @@ class Movement:
         """Take a step.
 
         Args:
-            means: What the neighbours have achieved, (POPULATION,).
+            means: What the neighbours have achieved, or their places by it, (POPULATION,).
         """
         assert self._strategy is not None
         if np.ptp(means) == 0:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import get_args
 
 from sarl_core.errors import InputError, quoted
-from sarl_core.improving.refinement import refinement_seeds
+from sarl_core.improving.refinement import SearchEffort
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.mining.combining.candidates import Pair
 from sarl_core.mining.rules import Thresholds
@@ -44,6 +44,9 @@ class Plan:
             with; as `Refinement` does it where None.
         search_steps: In each turn, in which the rules are changed by what their own episodes say
             in place of what the expert says; 0 for none.
+        search_generations: Of a turn, in which the thresholds of the best rules are moved; as
+            `Refinement` does it where None. Of more than 16 each leaves its worse half after a
+            third of the episodes, and half of the rest after two thirds.
         search_worth: What a failure counts in it, in units of the return; where None, as much as
             the returns of the rounds differ, and nothing where `choose` is the return.
         validation: Episodes by which the best of all is chosen in the end.
@@ -67,6 +70,7 @@ class Plan:
     search_limit: int | None = None
     search_starts: int | None = None
     search_steps: int = 0
+    search_generations: int | None = None
     search_worth: float | None = None
     validation: int = 256
     report: int = 100
@@ -102,6 +106,7 @@ class Plan:
             ("limit of a search episode", _or_one(self.search_limit), 1, None),
             ("number of search starts", _or_one(self.search_starts), 1, self.rounds),
             ("number of search steps", self.search_steps, 0, None),
+            ("number of search generations", _or_one(self.search_generations), 1, None),
             ("max_steps", _or_one(self.max_steps), 1, None),
         ):
             _check_number(name, value, least, most)
@@ -112,20 +117,26 @@ class Plan:
             )
         _check_number("number of turns", self.turns, 0, self._most_turns())
 
+    @property
+    def search(self) -> SearchEffort:
+        """How much the refinement tries, which may begin with each round."""
+        return SearchEffort(
+            self.search_episodes,
+            self.rounds,
+            self.search_starts,
+            self.search_steps,
+            self.search_generations,
+        )
+
     def _most_turns(self) -> int:
         """Of which the seeds of one run are enough."""
-        none, one = (
-            refinement_seeds(
-                n, self.search_episodes, self.rounds, self.search_starts, self.search_steps
-            )
-            for n in range(2)
-        )
+        none, one = (self.search.seeds(turns) for turns in range(2))
         left = SEEDS_A_RUN - none
         if self.turns and left < one - none:
             raise InputError(
                 f"the first turn and what comes before it take {one:,} episodes of their own, and "
-                f"one run has {SEEDS_A_RUN:,}; give fewer rounds, --search-steps or "
-                "--search-episodes"
+                f"one run has {SEEDS_A_RUN:,}; give fewer rounds, --search-steps, "
+                "--search-generations or --search-episodes"
             )
         return max(left, 0) // (one - none)
 

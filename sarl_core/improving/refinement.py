@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -29,7 +29,11 @@ from sarl_core.improving.policy_improvement import (
 )
 from sarl_core.improving.questions import answered, ask, scores, with_values
 from sarl_core.improving.shapes import MetStates, neighbours
-from sarl_core.improving.successive_halving import planned_episodes, successive_halving
+from sarl_core.improving.successive_halving import (
+    Selection,
+    planned_episodes,
+    successive_halving,
+)
 from sarl_core.mining.budgeted_trees import leaf_rules
 from sarl_core.mining.combining.candidates import Pair, candidates
 from sarl_core.mining.growing.structure import count_tree
@@ -50,7 +54,8 @@ _SHAPES = 4  # that are moved: which has most in it is not seen before
 _STARTS = 8  # of which one is moved before the first turn, `_SHAPES` at least
 _EARLY = 4  # generations for each of them before the worse half is left, then twice as many, ...
 _EARLY_STEPS = 1  # or so many steps
-_LATE = 16  # further ones for the best
+_LATE = 16  # further ones for the best, in each turn, where nothing else is said
+_SOONER = 3  # part of their episodes after which the worse half is left, where there are more
 
 # Times the episodes of a neighbour:
 _EXPERT = 2  # in which it is seen how long the expert takes
@@ -67,7 +72,7 @@ _PROPOSED = (3, 24)  # for what is proposed, before the worse half is left, and 
 def _halvings(ways: int, steps: int) -> list[tuple[int, int]]:
     """How many ways are gone on with before each halving, of so many, and how far each.
 
-    A step takes about as many episodes as eight generations.
+    A step takes about as many episodes as eight generations that play all of them.
     """
     stages, generations = [], _EARLY_STEPS if steps else _EARLY
     while ways > 1:
@@ -76,74 +81,90 @@ def _halvings(ways: int, steps: int) -> list[tuple[int, int]]:
     return stages
 
 
-def _ways_of(starts: int, moved: int | None) -> int:
-    """How many of so many starts are moved."""
-    return min(starts, max(_SHAPES, starts // _STARTS) if moved is None else moved)
+@dataclass(frozen=True)
+class SearchEffort:
+    """How much a refinement tries.
 
-
-def refinement_cost(
-    turns: int, episodes: int, starts: int = 1, moved: int | None = None, steps: int = 0
-) -> int:
-    """Most episodes of a refinement.
-
-    Args:
-        turns: How many.
-        episodes: Of each neighbour.
-        starts: What it may begin with.
-        moved: How many of these are moved; as `Refinement` does it where None.
-        steps: Of a turn, as `Refinement` takes them.
+    Attributes:
+        episodes: For each neighbour, the same for all of a generation.
+        starts: What it may begin with, how many.
+        moved: How many of these, that achieve most, have their thresholds moved; an eighth of all,
+            four at least, where None.
+        steps: In each turn, in which the rules are changed by what their own episodes say, in
+            place of neighbours in shape; then what it may begin with is moved in the same way.
+        late: Generations in which the thresholds of the best are moved, in each turn; 16 where
+            None. Of more than 16 each leaves its worse half sooner.
     """
 
-    def ranked(count: int, times: int) -> int:
-        return planned_episodes(count, episodes, times * episodes)
+    episodes: int
+    starts: int = 1
+    moved: int | None = None
+    steps: int = 0
+    late: int | None = None
 
-    first, most = (times * episodes for times in _PROPOSED)
-    played = (_DEVIATED + _FOLLOWED) * episodes
-    step = played + planned_episodes(1 + MOST_PROPOSALS, first, most)
+    @property
+    def ways(self) -> int:
+        """How many starts are moved."""
+        usual = max(_SHAPES, self.starts // _STARTS)
+        return min(self.starts, usual if self.moved is None else self.moved)
 
-    def halved(ways: int) -> int:
-        return sum(
-            left * (generations * (step if steps else POPULATION * episodes) + _RANKED * episodes)
-            for left, generations in _halvings(ways, steps)
-        )
+    @property
+    def generations(self) -> int:
+        """In which the best is moved, in each turn."""
+        return _LATE if self.late is None else self.late
 
-    met, compared = _MET * episodes, 2 * _COMPARED * episodes
-    ways = _ways_of(starts, moved)
-    before = ways * _BEFORE * played if steps else 0
-    begun = ranked(starts, _COMPARED) + met + halved(ways) + compared
-    late = _LATE * POPULATION * _CAREFUL * episodes
-    changed = steps * step + met if steps else ranked(_NEIGHBOURS, _RANKED) + halved(_SHAPES)
-    turn = met + changed + late + 2 * compared
-    return _EXPERT * episodes + before + (begun if starts > 1 else 0) + turns * turn
+    def sooner(self, episodes: int) -> int:
+        """Episodes of a generation after which its worse half is left, of so many."""
+        return -(-episodes // _SOONER) if self.generations > _LATE else episodes
 
+    def cost(self, turns: int) -> int:
+        """Most episodes of so many turns, and of what comes before them."""
+        episodes, played = self.episodes, (_DEVIATED + _FOLLOWED) * self.episodes
 
-def refinement_seeds(
-    turns: int, episodes: int, starts: int = 1, moved: int | None = None, steps: int = 0
-) -> int:
-    """Most seeds of a refinement: all that are compared play the same episodes.
+        def ranked(count: int, times: int) -> int:
+            return planned_episodes(count, episodes, times * episodes)
 
-    Args:
-        turns: How many.
-        episodes: Of each neighbour.
-        starts: What it may begin with.
-        moved: How many of these are moved; as `Refinement` does it where None.
-        steps: Of a turn, as `Refinement` takes them.
-    """
-    played = _DEVIATED + _FOLLOWED
-    step = played + _PROPOSED[-1]
+        def moved(times: int) -> int:
+            most = times * episodes
+            return planned_episodes(POPULATION, self.sooner(most), most)
 
-    def halved(ways: int) -> int:
-        each = step if steps else 1
-        return sum(
-            left * generations * each + _RANKED for left, generations in _halvings(ways, steps)
-        )
+        first, most = (times * episodes for times in _PROPOSED)
+        step = played + planned_episodes(1 + MOST_PROPOSALS, first, most)
 
-    ways = _ways_of(starts, moved)
-    before = ways * _BEFORE * played if steps else 0
-    begun = _COMPARED + _MET + halved(ways) + _COMPARED
-    changed = steps * step + _MET if steps else _RANKED + halved(_SHAPES)
-    turn = _MET + changed + _COMPARED + _LATE * _CAREFUL + _COMPARED
-    return episodes * (_EXPERT + before + (begun if starts > 1 else 0) + turns * turn)
+        def halved(ways: int) -> int:
+            each = step if self.steps else moved(1)
+            return sum(
+                left * (generations * each + _RANKED * episodes)
+                for left, generations in _halvings(ways, self.steps)
+            )
+
+        met, compared = _MET * episodes, 2 * _COMPARED * episodes
+        before = self.ways * _BEFORE * played if self.steps else 0
+        begun = ranked(self.starts, _COMPARED) + met + halved(self.ways) + compared
+        changed = ranked(_NEIGHBOURS, _RANKED) + halved(_SHAPES)
+        if self.steps:
+            changed = self.steps * step + met
+        moved_on = self.generations * moved(_CAREFUL)
+        turn = met + changed + moved_on + 2 * compared
+        return _EXPERT * episodes + before + (begun if self.starts > 1 else 0) + turns * turn
+
+    def seeds(self, turns: int) -> int:
+        """Most seeds of them: all that are compared play the same episodes."""
+        played = _DEVIATED + _FOLLOWED
+        step = played + _PROPOSED[-1]
+
+        def halved(ways: int) -> int:
+            each = step if self.steps else 1
+            return sum(
+                left * generations * each + _RANKED
+                for left, generations in _halvings(ways, self.steps)
+            )
+
+        before = self.ways * _BEFORE * played if self.steps else 0
+        begun = _COMPARED + _MET + halved(self.ways) + _COMPARED
+        changed = self.steps * step + _MET if self.steps else _RANKED + halved(_SHAPES)
+        turn = _MET + changed + _COMPARED + self.generations * _CAREFUL + _COMPARED
+        return self.episodes * (_EXPERT + before + (begun if self.starts > 1 else 0) + turns * turn)
 
 
 Way: TypeAlias = Movement | PolicyImprovement
@@ -161,9 +182,7 @@ class Refinement:
         expert: Agent,
         combined: Sequence[Pair] = (),
         max_rules: int,
-        episodes: int,
-        moved: int | None = None,
-        steps: int = 0,
+        effort: SearchEffort,
         first: int,
         seed: int = 0,
         jobs: int = 1,
@@ -180,11 +199,7 @@ class Refinement:
             expert: Who is asked about the states that they lead to.
             combined: Pairs of features of which new queries may ask about combinations.
             max_rules: Most leaves of each tree.
-            episodes: For each neighbour, the same for all of a generation.
-            moved: How many of the starts that achieve most have their thresholds moved; an eighth
-                of all, four at least, where None.
-            steps: In each turn, in which the rules are changed by what their own episodes say, in
-                place of neighbours in shape; then what it may begin with is moved in the same way.
+            effort: How much is tried; of these starts, however many it says.
             first: Seed of the first episode.
             seed: Another one gives another way.
             jobs: Processes; changes the speed, never the result.
@@ -201,8 +216,8 @@ class Refinement:
         self._progress: Progress | None = None
         self._done = self._total = 0
         self._evaluator, self._expert = evaluator, expert
-        self._combined, self._max_rules, self._episodes = combined, max_rules, episodes
-        self._moved_starts, self._steps = moved, steps
+        self._combined, self._max_rules = combined, max_rules
+        self._effort = replace(effort, starts=len(starts))
         self._improvement: PolicyImprovement | None = None  # that led here
         self._next, self._generator = first, np.random.default_rng(seed)
         self._workers = executor_of(jobs, executor)
@@ -231,41 +246,39 @@ class Refinement:
             WorkError: If a process ended in the middle of its work.
             CancelledError: If `progress` returned False.
         """
-        self._progress, self._total = progress, self._cost(turns, len(self._starts))
+        self._progress, self._total = progress, self._effort.cost(turns)
         self._better = better or (lambda _: None)
         self._begin()
-        begun = self._done - self._cost(0)
+        planned = replace(self._effort, starts=1)
+        begun = self._done - planned.cost(0)
         marks = [self.start, self.here]
         for turn in range(1, turns + 1):
             self._turn()
             # Some had fewer neighbours.
-            self._tell(begun + self._cost(turn) - self._done)
+            self._tell(begun + planned.cost(turn) - self._done)
             marks.append(self.here)
         different: dict[tuple[object, ...], Candidate] = {}
         for one in marks:
             different.setdefault(one.key, one)
         return list(different.values())
 
-    def _cost(self, turns: int, starts: int = 1) -> int:
-        return refinement_cost(turns, self._episodes, starts, self._moved_starts, self._steps)
-
     def _begin(self) -> None:
         """Begin with what achieves most when it is moved."""
         self._evaluator = replace(self._evaluator, max_steps=self._patience())
         if len(self._starts) == 1:
             self._better(self.start)
-            if self._steps:
+            if self._effort.steps:
                 self._improvement = self._improving(self.start)
             return
         ranking = self._ranking(self._starts, self._pairs, _COMPARED)
         self._begin_with(ranking[0])
         self._better(self.start)
         met = self._met()
-        best = ranking[: _ways_of(len(self._starts), self._moved_starts)]
+        best = ranking[: self._effort.ways]
         begun = [self._starts[index] for index in best]
         ways: Sequence[Way] = (
             [self._improving(start) for start in begun]
-            if self._steps
+            if self._effort.steps
             else [self._movement(start, met) for start in begun]
         )
         place = self._halved(ways, met)
@@ -275,7 +288,7 @@ class Refinement:
             self._go_on(way)
         elif isinstance(way, PolicyImprovement):
             self._improvement = way  # what it has learned serves on
-        self._tell(self._cost(0, len(self._starts)) - self._done)
+        self._tell(self._effort.cost(0) - self._done)
 
     def _begin_with(self, index: int) -> None:
         self.begun, self.start = index, self._starts[index]
@@ -304,7 +317,7 @@ class Refinement:
         """Change the shape, if that is better, and move the thresholds, if that is."""
         met = self._met()
         ways: Sequence[Way]
-        if self._steps:
+        if self._effort.steps:
             ways = [self._improved_further(met)]
         else:
             ways = [self._movement(shape, met) for shape in self._shapes(met)]
@@ -313,10 +326,10 @@ class Refinement:
             is_other = changed.here is not self.here
             if is_other and self._is_as_good(changed.here, self.here, met):
                 self._go_on(changed)
-                met = self._met() if self._steps else met
+                met = self._met() if self._effort.steps else met
         # What it has learned of the way serves on.
         way = self._way or self._movement(self.here, met)
-        self._move(way, _LATE, met, times=_CAREFUL)
+        self._move(way, self._effort.generations, met, times=_CAREFUL)
         if self._is_as_good(way.here, self.here, met):
             self._go_on(way)
         else:  # it was led astray
@@ -327,7 +340,7 @@ class Refinement:
         way = self._improvement
         assert way is not None
         way.here = self.here
-        self._advance(way, self._steps, met)
+        self._advance(way, self._effort.steps, met)
         return way
 
     def _halved(self, ways: Sequence[Way], met: MetStates) -> int:
@@ -337,7 +350,7 @@ class Refinement:
         not moved here: there is nothing to choose.
         """
         left: Sequence[int] = range(len(ways))
-        for _, generations in _halvings(len(ways), self._steps):
+        for _, generations in _halvings(len(ways), self._effort.steps):
             for place in left:
                 self._advance(ways[place], generations, met)
             moved = [ways[place].here for place in left]
@@ -426,14 +439,20 @@ class Refinement:
 
         The worse half is left after `first` times as many; of equals, the first is first.
         """
+        episodes = self._effort.episodes
+        return self._selection(tried, pairs, first=first * episodes, most=times * episodes).ranking
+
+    def _selection(
+        self, tried: Sequence[Candidate], pairs: Demonstrations, *, first: int, most: int
+    ) -> Selection:
+        """What candidates achieve in the same episodes, of which the worse half plays fewer."""
 
         def achieved(left: Sequence[int], seed: int, count: int) -> list[NDArray[np.float64]]:
             return self._scores([tried[place] for place in left], pairs, seed=seed, episodes=count)
 
-        most = times * self._episodes
         return successive_halving(
-            len(tried), achieved, seed=self._take(most), first=first * self._episodes, most=most
-        ).ranking
+            len(tried), achieved, seed=self._take(most), first=first, most=most
+        )
 
     def _movement(self, candidate: Candidate, met: MetStates) -> Movement:
         pairs = met.pairs.deriving(candidate.derived)
@@ -487,12 +506,13 @@ class Refinement:
         self, movement: Movement, generations: int, met: MetStates, *, times: int = 1
     ) -> None:
         """Move thresholds in the direction that brings more."""
-        episodes = times * self._episodes
+        episodes = times * self._effort.episodes
         for _ in range(generations if movement.count else 0):
-            achieved = self._scores(
-                movement.ask(), met.pairs, seed=self._take(episodes), episodes=episodes
+            tried = movement.ask()
+            selection = self._selection(
+                tried, met.pairs, first=self._effort.sooner(episodes), most=episodes
             )
-            movement.tell(np.array([one.mean() for one in achieved]))
+            movement.tell(selection.places())
 
     def _scores(
         self, tried: Sequence[Candidate], pairs: Demonstrations, *, seed: int, episodes: int
@@ -510,7 +530,7 @@ class Refinement:
 
     def _play(self, agent: Agent, shield: Shield | None, times: int) -> Episodes:
         """So many times the episodes of an agent, with every step."""
-        before, episodes = self._done, times * self._episodes
+        before, episodes = self._done, times * self._effort.episodes
         return rollout(
             self._evaluator.env_id,
             agent,

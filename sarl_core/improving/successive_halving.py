@@ -23,16 +23,42 @@ class Selection:
         ranking: All of them, the best first; who left early stands behind who stayed.
         means: Mean return of each candidate over the episodes it was given, (K,).
         episodes: How many each was given, (K,) int64.
+        turns: Mean return after each of T turns, NaN for who had left, (T, K).
     """
 
     ranking: tuple[int, ...]
     means: NDArray[np.float64]
     episodes: NDArray[np.int64]
+    turns: NDArray[np.float64]
 
     @property
     def best(self) -> int:
         """Index of the best one."""
         return self.ranking[0]
+
+    def places(self) -> NDArray[np.float64]:
+        """Whom to follow.
+
+        Returns:
+            Shape (K,), more where a candidate is better. Who left early lies behind who stayed;
+            where both had achieved the same, it has the mean place of those it is equal to.
+        """
+        from scipy.stats import rankdata
+
+        places = np.full(len(self.means), np.nan)
+        for means in reversed(self.turns):
+            stayed = ~np.isnan(places)
+            left = ~np.isnan(means) & ~stayed
+            if not stayed.any():
+                places[left] = rankdata(means[left])
+                continue
+            alike = left & np.isin(means, means[stayed])
+            lowest = places[stayed].min()
+            for place in np.flatnonzero(alike):
+                places[place] = places[stayed & (means == means[place])].mean()
+            behind = left & ~alike
+            places[behind] = lowest - 1 - behind.sum() + rankdata(means[behind])
+        return places
 
 
 def planned_episodes(candidates: int, first: int, most: int) -> int:
@@ -85,12 +111,15 @@ def successive_halving(
         return mean_score(np.concatenate(scored[candidate]))
 
     left, behind = list(range(candidates)), list[int]()
+    turns: list[NDArray[np.float64]] = []
     given = 0
     while given < most:
         new = min(max(first, given), most - given)
         for candidate, scores in zip(left, score(left, seed + given, new), strict=True):
             scored[candidate].append(scores.reshape(len(scores), -1))
         given += new
+        turns.append(np.full(candidates, np.nan))
+        turns[-1][left] = [means(candidate)[-1] for candidate in left]
         ranked = sorted(left, key=means, reverse=True)  # of equals, the first stays first
         stay = max(1, (len(ranked) + 1) // 2)
         left, behind = ranked[:stay], ranked[stay:] + behind
@@ -98,4 +127,5 @@ def successive_halving(
         ranking=(*left, *behind),
         means=np.array([means(candidate)[-1] for candidate in range(candidates)]),
         episodes=np.array([sum(map(len, one)) for one in scored], dtype=np.int64),
+        turns=np.array(turns),
     )

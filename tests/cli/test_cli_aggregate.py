@@ -73,6 +73,8 @@ def test_without_an_expert_the_gaps_are_written(run, tmp_path):
             ("--refine", "1", "--search-steps", "9999"),
             "the first turn and what comes before it take",
         ),
+        (("--search-generations", "9"), "--search-generations is about a refinement"),
+        (("--refine", "1", "--search-generations", "0"), "the number of search generations is 0"),
         (("--search-worth", "9"), "--search-worth is about a refinement"),
         (("--refine", "1", "--search-worth", "-1"), "the worth of a failure is -1; give a number"),
         (("--refine", "1", "--search-worth", "1e200"), "give a number from 0 to 1e+09"),

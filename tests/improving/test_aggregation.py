@@ -218,7 +218,7 @@ def test_the_card_says_how_the_rules_came_about(found, tmp_path):
         ({"turns": 1, "search_episodes": 10**9}, "give 1,000 or fewer"),
         (
             {"turns": 1, "rounds": 400, "search_episodes": 1_000},
-            "give fewer rounds, --search-steps or",
+            "give fewer rounds, --search-steps, --search-generations or",
         ),
         ({"turns": 1, "search_limit": 0}, "the limit of a search episode is 0"),
         ({"seed": -1}, "the seed is -1"),

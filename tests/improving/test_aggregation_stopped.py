@@ -101,7 +101,7 @@ def test_no_episode_is_used_for_two_things(cart, small_search, calls, monkeypatc
     assert len(used["rounds"]) == 2 * 3
     begun, turn = 2 + 2 + (2 + 2) + 2, 2 + 2 + (2 + 2) + 2 + 2 * 1 + 2
     each = 2 * (1 + begun + turn)
-    assert len(used["refinement"]) == refinement.refinement_seeds(1, 2, 2) == each
+    assert len(used["refinement"]) == refinement.SearchEffort(2, 2).seeds(1) == each
     assert len(used["report"]) == 5
     # And the record says where each begins.
     assert found.seeds._asdict() == {name: min(used[name]) for name in SEEDS}

@@ -14,7 +14,7 @@ from sarl_core.improving import policy_improvement, refinement
 from sarl_core.improving.candidate import Candidate, Evaluator
 from sarl_core.improving.movement import POPULATION, Movement, ranks
 from sarl_core.improving.policy_improvement import PolicyImprovement
-from sarl_core.improving.refinement import Refinement, refinement_cost, refinement_seeds
+from sarl_core.improving.refinement import Refinement, SearchEffort
 from sarl_core.improving.shapes import MetStates, neighbours
 from sarl_core.mining.budgeted_trees import grow_budgeted_trees, leaf_rules
 from sarl_core.mining.combining.candidates import pairs_of_like_kind
@@ -185,7 +185,7 @@ def mean_return(rules) -> float:
     return float(rollout(CART, "novice", shield=Shield(rules), episodes=32, seed=77).returns.mean())
 
 
-def search(*others, episodes: int = 2, **named) -> Refinement:
+def search(*others, episodes: int = 2, **effort) -> Refinement:
     trees = grow_budgeted_trees(CARTPOLE, max_rules=2)
     return Refinement(
         [trees, *others],
@@ -194,9 +194,8 @@ def search(*others, episodes: int = 2, **named) -> Refinement:
         expert=make_agent("expert", CART),
         combined=pairs_of_like_kind(CARTPOLE),
         max_rules=2,
-        episodes=episodes,
+        effort=SearchEffort(episodes, **effort),
         first=1_000,
-        **named,
     )
 
 
@@ -214,7 +213,7 @@ def test_two_rules_over_two_features_balance_the_pole(sized_search) -> None:
     last = search(episodes=6).run(
         1, progress=lambda done, total: ticks.append((done, total)) or True
     )[-1]
-    assert ticks[-1] == (refinement_cost(1, 6), refinement_cost(1, 6))
+    assert ticks[-1] == (SearchEffort(6).cost(1),) * 2
     assert ticks == sorted(ticks)
     (first,) = grow_budgeted_trees(CARTPOLE, max_rules=2)
     assert mean_return(leaf_rules([first])) < 300
@@ -234,7 +233,7 @@ def test_intervals_stay_what_they_are_where_other_amounts_are_met(small_search) 
         Evaluator(pendulum, make_agent("novice", pendulum), "centre", 8, 0.0, 20),
         expert=make_agent("expert", pendulum),
         max_rules=4,
-        episodes=2,
+        effort=SearchEffort(2),
         first=0,
     )
     met = search._met().pairs
@@ -268,7 +267,7 @@ def test_it_begins_with_what_achieves_most_when_it_is_moved(
     marks = begun.run(
         2, progress=lambda done, total: ticks.append((done, total)) or True, better=told.append
     )
-    assert ticks[-1] == (refinement_cost(2, 2, 3), refinement_cost(2, 2, 3))
+    assert ticks[-1] == (SearchEffort(2, 3).cost(2),) * 2
     first, halved, end, *_ = compared
     order = ranks[0]
     best = max(first, key=lambda one: mean_return(leaf_rules(one.trees(CARTPOLE, 2))))
@@ -342,7 +341,7 @@ def test_what_takes_much_longer_than_the_expert_is_tried_no_further(
         Evaluator(lander, make_agent("novice", lander), "centre", 2, 0.0, None),
         expert=expert,
         max_rules=4,
-        episodes=10,
+        effort=SearchEffort(10),
         first=50,
     )
     limits: list[int | None] = []
@@ -428,7 +427,7 @@ def test_in_steps_rules_are_changed_by_what_their_episodes_say(
     begun._evaluator = replace(TRIAL, max_steps=150)
     ticks: list[tuple[int, int]] = []
     marks = begun.run(2, progress=lambda done, total: ticks.append((done, total)) or True)
-    planned = refinement_cost(2, 2, 1 + len(starts), steps=2)
+    planned = SearchEffort(2, 1 + len(starts), steps=2).cost(2)
     assert ticks[-1] == (planned, planned)
     assert ticks == sorted(ticks)
     assert not asked  # the expert's wishes lead nowhere then
@@ -439,11 +438,45 @@ def test_in_steps_rules_are_changed_by_what_their_episodes_say(
     assert last > mean_return(leaf_rules(grow_budgeted_trees(CARTPOLE, max_rules=2)))
 
 
+def test_thresholds_are_moved_in_as_many_generations_as_is_said(small_search, monkeypatch) -> None:
+    told: list[int] = []
+    monkeypatch.setattr(Movement, "tell", lambda self, means: told.append(len(means)))
+
+    def generations(late: int | None) -> int:
+        told.clear()
+        ticks: list[tuple[int, int]] = []
+        search(late=late).run(1, progress=lambda *tick: ticks.append(tick) or True)
+        assert ticks[-1] == (SearchEffort(2, late=late).cost(1),) * 2
+        return len(told)
+
+    assert generations(5) == generations(1) + 4 == generations(None) + 4
+    more, few = (SearchEffort(2, late=late).seeds(1) for late in (5, 1))
+    assert more - few == 4 * refinement._CAREFUL * 2
+
+
+def test_of_many_generations_each_leaves_its_worse_half_sooner(small_search, monkeypatch) -> None:
+    played: list[tuple[int, int]] = []
+    scores = Evaluator.scores
+
+    def playing(self, tried, pairs, **named):
+        played.append((len(tried), named["episodes"]))
+        return scores(self, tried, pairs, **named)
+
+    monkeypatch.setattr(Evaluator, "scores", playing)
+    monkeypatch.setattr(refinement, "_LATE", 1)
+    assert refinement.POPULATION == 4
+    more, few = (SearchEffort(6, late=late).cost(1) for late in (6, 2))
+    # Of twelve episodes all play a third, the better half another, and a quarter the last.
+    assert more - few == 4 * (4 * 4 + 4 * 2 + 4 * 1)
+    search(episodes=6, late=3).run(1)
+    assert [each for each in played if each[1] == 4] == 3 * [(4, 4), (2, 4), (1, 4)]
+
+
 def test_the_seeds_of_a_turn_are_counted() -> None:
     # Those of the expert and of the choice where to begin are used once.
-    once, one, two = (refinement_seeds(turns, 16) for turns in range(3))
+    once, one, two = (SearchEffort(16).seeds(turns) for turns in range(3))
     assert two - one == one - once > once > 0
-    assert refinement_seeds(2, 32) == 2 * two
+    assert SearchEffort(32).seeds(2) == 2 * two
 
 
 @pytest.mark.parametrize(("moved", "ways"), [(None, 2), (5, 5), (1, 1)])
@@ -461,4 +494,4 @@ def test_as_many_starts_are_moved_as_is_said(moved, ways, sized_search, monkeypa
     ticks: list[tuple[int, int]] = []
     search(*others, moved=moved).run(0, progress=lambda *tick: ticks.append(tick) or True)
     assert counted == [ways]
-    assert ticks[-1] == (refinement_cost(0, 2, 5, moved),) * 2
+    assert ticks[-1] == (SearchEffort(2, 5, moved).cost(0),) * 2

@@ -92,3 +92,30 @@ def test_failures_come_first_and_the_return_second():
     found = successive_halving(4, score, seed=0, first=10, most=40)
     assert found.best == 2
     assert found.means.tolist() == returns
+
+
+def test_who_left_early_lies_behind_who_stayed() -> None:
+    found = successive_halving(4, noisy([1.0, 9, 3, 8], 0.0), seed=0, first=2, most=4)
+    assert found.episodes.tolist() == [2, 4, 2, 4]
+    one, best, two, second = found.places()
+    assert one < two < second < best
+    one_stage = successive_halving(3, noisy([5.0, 6.5, 5.0], 0.0), seed=0, first=4, most=4)
+    assert one_stage.places().tolist() == [1.5, 3.0, 1.5]
+
+
+def test_who_did_as_well_as_one_that_stayed_does_not_lie_behind() -> None:
+    """Luck is that of the episodes, so that who acts alike achieves the same in each."""
+    luck = np.random.default_rng(3).normal(0, 50, 100)
+
+    def score(means):
+        return lambda left, first, count: [means[one] + luck[first : first + count] for one in left]
+
+    alike = successive_halving(20, score(np.zeros(20)), seed=0, first=6, most=16)
+    assert np.ptp(alike.means) > 1
+    assert np.ptp(alike.places()) == 0
+    one_worse = successive_halving(20, score(np.r_[np.zeros(19), -1]), seed=0, first=6, most=16)
+    assert len(np.unique(one_worse.places())) == 2
+    assert one_worse.places().argmin() == 19
+    better = successive_halving(8, score(np.r_[np.zeros(6), 1.0, 2.0]), seed=0, first=2, most=8)
+    *many, second, best = better.places()
+    assert max(many) < second < best

@@ -10,7 +10,7 @@ import streamlit as st
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import SarlError
 from sarl_core.improving.plan import Plan
-from sarl_core.improving.refinement import refinement_cost
+from sarl_core.improving.refinement import SearchEffort
 from sarl_core.mining.budgeted_trees import MIN_RULES
 from sarl_core.rollouts.choices import CHOICE_TEXTS, Choice
 from sarl_dashboard.components.journey.words import with_words
@@ -182,7 +182,8 @@ def _further(demonstrations: Demonstrations, rounds: int, *, has_expert: bool) -
             ),
         )
         if cut == EVERY_LEAF:
-            none, one = (refinement_cost(turns, Plan.search_episodes, rounds) for turns in range(2))
+            effort = SearchEffort(Plan.search_episodes, rounds)
+            none, one = (effort.cost(turns) for turns in range(2))
             refinement = number(
                 "Refinement turns",
                 "refine",
