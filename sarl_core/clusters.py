@@ -10,42 +10,94 @@ import asyncio
 import atexit
 import logging
 import re
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager
 from importlib import import_module
-from threading import Thread
+from math import inf
+from threading import Lock, Thread
 from typing import Any, ParamSpec, TypeVar
 
-from sarl_core.errors import InputError, WorkError, needing_extras, quoted
+from sarl_core.errors import InputError, SarlError, WorkError, needing_extras, quoted
 
 VARIABLE = "SARL_CLUSTER"
 """The environment variable that names a cluster for the jobs of a dashboard."""
 _LOCAL = re.compile(r"local:(?P<workers>\d{1,3})(?::(?P<memory>\d+(?:\.\d+)?\s*[kMGT]i?B))?")
 _SECONDS = 10  # to wait for a scheduler, and for its first worker
 _START_SECONDS = 60  # to wait for processes of this machine
+_REFUSED_SECONDS = 3  # in which others who waited are told what was found
+_ENDED = "the cluster ended in the middle of the work; run again"
 
 Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
 
 
+def loss_text(error: Exception, lost: str) -> str:
+    """The sentence for one of the `losses`.
+
+    Args:
+        error: It.
+        lost: What is said where workers ended.
+
+    Returns:
+        That, or that the cluster did.
+    """
+    killed = type(error).__name__ == "KilledWorker"
+    return lost if killed else _ENDED
+
+
 class ClusterExecutor(Executor):
     """The processes of a cluster, as those of this machine."""
 
-    def __init__(self, client: Any) -> None:
+    loss_text = staticmethod(loss_text)
+
+    def __init__(self, client: Any = None, again: Callable[[], Any] | None = None) -> None:
         """Take its client.
 
         Args:
-            client: A ``distributed.Client``.
+            client: A ``distributed.Client``; None for one that `again` gives when it is needed.
+            again: Gives another one, once its scheduler was lost; None where that is the end.
         """
         self.losses = losses()
-        self._client = client
-        self._executor = client.get_executor(pure=False)
+        self._client, self._again, self._lock = client, again, Lock()
+        self._refused: tuple[float, SarlError] = -inf, InputError("")
+
+    def _connected(self) -> Any:
+        """Its client; where the scheduler was lost, and may be back, another one.
+
+        Raises:
+            InputError: If it is not.
+        """
+        with self._lock:
+            lost = self._client is None or self._client.status != "running"
+            if lost and self._again is not None:
+                refused, problem = self._refused
+                if time.monotonic() - refused < _REFUSED_SECONDS:
+                    raise problem
+                try:
+                    self._client = self._again()
+                except SarlError as error:
+                    self._refused = time.monotonic(), error
+                    raise
+            return self._client
 
     @property
     def workers(self) -> int:
-        """How many calls it works on at once now: workers come and go."""
-        return max(1, sum(map(int, self._client.nthreads().values())))
+        """How many calls it works on at once now: workers come and go.
+
+        Raises:
+            InputError: If the scheduler is lost.
+            WorkError: If it is lost just now.
+        """
+        client = self._connected()
+        try:
+            threads = client.nthreads() if client.status == "running" else {}
+        except (OSError, RuntimeError) as error:
+            raise WorkError(_ENDED) from error
+        if client.status != "running":
+            raise WorkError(_ENDED)
+        return max(1, sum(map(int, threads.values())))
 
     def submit(
         self,
@@ -55,12 +107,15 @@ class ClusterExecutor(Executor):
         **named: Arguments.kwargs,
     ) -> Future[Result]:
         """See `Executor.submit`."""
-        future: Future[Result] = self._executor.submit(call, *arguments, **named)
+        executor = self._connected().get_executor(pure=False)
+        future: Future[Result] = executor.submit(call, *arguments, **named)
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Let go of the cluster, which goes on."""
-        self._client.close()
+        self._again = None
+        if self._client is not None:
+            self._client.close()
 
 
 @contextmanager
@@ -82,21 +137,27 @@ def cluster_executor(address: str) -> Iterator[ClusterExecutor]:
 
 
 def lasting_executor(address: str) -> ClusterExecutor:
-    """The same until this program ends, as for a server.
+    """The same until this program ends, as for a server: it connects when there is work.
 
     Args:
         address: As of `cluster`.
 
     Returns:
-        The executor.
+        The executor; work is refused with an `InputError`, as by `cluster`.
 
     Raises:
-        InputError: As `cluster`.
         WorkError: If the extra "cluster" is not installed.
     """
+    with needing_extras():
+        import_module("distributed")
     stack = ExitStack()
     atexit.register(stack.close)
-    return ClusterExecutor(stack.enter_context(cluster(address)))
+
+    def connected() -> Any:
+        stack.close()  # of one that was lost, or is about to come back by itself
+        return stack.enter_context(cluster(address))
+
+    return ClusterExecutor(again=connected)
 
 
 @contextmanager
@@ -126,7 +187,8 @@ def cluster(address: str) -> Iterator[Any]:
     if local is not None and not int(local["workers"]):
         raise InputError(f"{quoted(address)} has no process; give one or more, as local:2")
     # What the processes of a cluster say of themselves is not for whoever waits for rules.
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     if local is not None:
         started = LocalCluster(
             n_workers=int(local["workers"]),
@@ -255,9 +317,10 @@ def _require_same_package(client: Any, address: str) -> None:
 def losses() -> tuple[type[Exception], ...]:
     """What a cluster raises when it cannot go on: workers ended, or all of it did."""
     from distributed import CancelledError, KilledWorker
+    from distributed.client import ClosedClientError
     from distributed.comm.core import CommClosedError
 
-    return KilledWorker, CommClosedError, CancelledError
+    return KilledWorker, CommClosedError, CancelledError, ClosedClientError
 
 
 def worked_out(futures: Sequence[Any], advance: Callable[[float], None]) -> Sequence[Any]:
@@ -285,9 +348,10 @@ def saying_losses() -> Iterator[None]:
     try:
         yield
     except losses() as error:
-        if type(error).__name__ == "KilledWorker":
-            raise WorkError(
+        raise WorkError(
+            loss_text(
+                error,
                 "several workers ended over the same piece of work, as when memory runs out; give "
-                "them more memory, or write smaller row groups"
-            ) from error
-        raise WorkError("the cluster ended in the middle of the work; run again") from error
+                "them more memory, or write smaller row groups",
+            )
+        ) from error

@@ -177,7 +177,7 @@ def audit_on_cluster(
             lambda share: advance(0.1 + 0.4 * share),
         )
         known = [
-            (Piece(part.segments[0].path, 0, 0, 0, survey.rows), survey.survey)
+            (Piece(part.segments[0].path, 0, 0, 0, survey.rows, ""), survey.survey)
             for part, survey in zip(parts, surveys, strict=True)
             if survey.survey is not None
         ]

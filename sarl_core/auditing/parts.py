@@ -56,11 +56,13 @@ class Segment:
         path: Of the file, from the root.
         first: The first row, from 0.
         rows: How many.
+        mark: Of the file.
     """
 
     path: str
     first: int
     rows: int
+    mark: str
 
     @property
     def name(self) -> str:
@@ -142,7 +144,7 @@ def segments_of(pieces_of_files: Sequence[Piece]) -> list[Segment]:
     for _, same in groupby(pieces_of_files, lambda piece: piece.file):
         first = 0
         for piece in same:
-            segments.append(Segment(piece.path, first, piece.rows))
+            segments.append(Segment(piece.path, first, piece.rows, piece.mark))
             first += piece.rows
     return segments
 
@@ -309,13 +311,11 @@ def read_part(part: LogPart, reading: Reading) -> PartRead:
 
 def _rows_of(segment: Segment, columns: list[str] | None = None) -> Any:
     """Rows of a file as a ``pyarrow.Table``, by the row groups that hold them."""
-    with naming(segment.name), opened_file(segment.path) as file:
+    with naming(segment.name), opened_file(segment.path, segment.mark) as file:
         about = file.metadata
         sizes = [about.row_group(group).num_rows for group in range(about.num_row_groups)]
         ends = np.cumsum(sizes)
         end = segment.first + segment.rows
-        if about.num_rows < end:
-            raise InputError("it has fewer rows than when the work began; begin anew")
         first = int(np.searchsorted(ends, segment.first, side="right"))
         last = int(np.searchsorted(ends, end))
         groups = list(range(first, last + 1))
@@ -434,7 +434,7 @@ def _within(segments: Sequence[Segment], first: int, end: int) -> tuple[Segment,
     for segment in segments:
         begins, ends = max(first, before), min(end, before + segment.rows)
         if begins < ends:
-            own = Segment(segment.path, segment.first + begins - before, ends - begins)
+            own = replace(segment, first=segment.first + begins - before, rows=ends - begins)
             if inside and inside[-1].path == own.path:
                 last = inside.pop()
                 own = replace(last, rows=last.rows + own.rows)

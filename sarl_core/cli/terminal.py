@@ -26,6 +26,15 @@ if TYPE_CHECKING:
 
 _WIDTH_IN_A_FILE = 160  # where no terminal says how wide it is, a table shall not be cut
 _INTERRUPTED = 130  # what a shell expects of a program that Ctrl-C ended
+_PLAIN = {
+    ": Value error, ": ": ",
+    "Input should be a valid number, unable to parse string as a number": (
+        "this is no number; give one such as 0.5"
+    ),
+    "Input should be a valid integer, unable to parse string as an integer": (
+        "this is no whole number; give one such as 5"
+    ),
+}
 
 Advance = Callable[[int, int], None]
 
@@ -100,7 +109,10 @@ def _complain(sentence: str) -> None:
 def _sentence_and_code(error: BaseException) -> tuple[str, int]:
     """An exception as a sentence and an exit code."""
     if isinstance(error, typer.TyperException):
-        return error.format_message() + _one_file_advice(error.format_message()), 2
+        message = error.format_message()
+        for for_programmers, words in _PLAIN.items():
+            message = message.replace(for_programmers, words)
+        return message + _one_file_advice(message), 2
     if isinstance(error, StoppedError):
         return str(error), _INTERRUPTED
     if isinstance(error, SarlError):

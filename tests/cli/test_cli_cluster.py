@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 import os
+import socket
+import time
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
+from distributed import LocalCluster
 
 from sarl_core import RuleSet, rollout
 from sarl_core.cli.app import main
-from sarl_core.clusters import cluster
+from sarl_core.clusters import ClusterExecutor, cluster, lasting_executor
+from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.mining.distributed.mined_files import load_mined_data
-from sarl_core.processes import run_each
+from sarl_core.processes import completed, run_each
 from sarl_core.shielding.leeway import leeway_of
 
 DATA = Path(__file__).resolve().parents[2] / "data" / "demonstrations"
@@ -310,3 +314,46 @@ def test_jobs_of_a_dashboard_are_done_on_the_cluster_of_its_owner(running_cluste
         finally:
             processes().shutdown()
             processes.clear()
+
+
+def test_a_scheduler_that_was_lost_and_is_back_is_used_again(monkeypatch):
+    monkeypatch.setattr("sarl_core.clusters._REFUSED_SECONDS", 0)
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+
+    def begun():
+        return LocalCluster(
+            n_workers=1,
+            processes=False,
+            protocol="tcp",
+            host="127.0.0.1",
+            scheduler_port=port,
+            dashboard_address=None,
+        )
+
+    executor = lasting_executor(f"tcp://127.0.0.1:{port}")
+    with pytest.raises(InputError, match=r"^no scheduler answers at"):
+        run_each(abs, [(-1,)], executor=executor)
+    with begun():
+        assert run_each(abs, [(-1,), (-2,)], executor=executor) == [1, 2]
+    with pytest.raises(SarlError, match=r"^(the cluster ended in the|no scheduler answers at)"):
+        run_each(abs, [(-1,)], executor=executor)
+    with begun():
+        try:
+            assert run_each(abs, [(-1,), (-2,)], executor=executor) == [1, 2]
+        finally:
+            executor.shutdown()
+
+
+def test_work_on_a_cluster_that_ends_meanwhile_is_one_sentence():
+    with cluster("local:1") as client:
+        executor = ClusterExecutor(client)
+        calls = [(number, time.sleep, (0.1,)) for number in range(100)]
+        work = completed(executor, calls, lost="a process ended")
+        next(work)
+        client.close()
+        with pytest.raises(WorkError, match=r"^the cluster ended in the middle of the work; run"):
+            list(work)
+        with pytest.raises(WorkError, match=r"^the cluster ended in the middle of the work; run"):
+            _ = executor.workers

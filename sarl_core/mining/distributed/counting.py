@@ -93,8 +93,8 @@ def _counted(
         order = np.argsort(there, kind="stable")
         first = np.flatnonzero(np.diff(there[order], prepend=-1))
         states = rows.observations[mined][order]
-        least[there[order][first]] = np.minimum.reduceat(states, first)
-        most[there[order][first]] = np.maximum.reduceat(states, first)
+        least[there[order][first]] = np.minimum.reduceat(states, first) + 0  # of two zeros one
+        most[there[order][first]] = np.maximum.reduceat(states, first) + 0
     episode = np.searchsorted(held_out, rows.episodes[held])
     key = (leaves[held] * len(held_out) + episode) * n_labels + labels[held]
     present, samples = np.unique(key, return_counts=True)

@@ -19,7 +19,7 @@ from sarl_core.mining.never.never_rules import forbidding_nodes, mine_at
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Rule, Thresholds
 from sarl_core.mining.tree import PolicyTree
-from sarl_core.mining.validation.cross_fitting import Fold, Judged
+from sarl_core.mining.validation.cross_fitting import Judged, judged_at
 
 Floats = NDArray[np.float64]
 
@@ -258,9 +258,10 @@ class MinedData:
         """
         if not self.counted(thresholds):
             return None
-        if thresholds.never is None:
-            return Fold(self.trees, self.held_out).at(thresholds)
         first = self.held_out[0]
+        if thresholds.never is None:
+            together = [counts.together for counts in self.held_out]
+            return judged_at(thresholds, self.trees, together, first.numbers, first.lengths)
         covered, correct = np.zeros((2, len(first.numbers)), dtype=np.int64)
         for tree, counts in zip(self.trees, self.held_out, strict=True):
             some, right = _together(tree, counts, thresholds)

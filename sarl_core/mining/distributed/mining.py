@@ -49,7 +49,7 @@ from sarl_core.mining.growing.histogram import BinnedStates
 from sarl_core.mining.growing.structure import TreeStructure, tree_levels, tree_of_counts
 from sarl_core.mining.labels import label_dimensions
 from sarl_core.mining.tree import PolicyTree, Source
-from sarl_core.mining.validation.episode_counts import count_above
+from sarl_core.mining.validation.episode_counts import LeafCounts, count_above
 from sarl_core.progress import Progress, report
 
 SAMPLE_ROWS = 2**19
@@ -375,4 +375,4 @@ def _episode_counts(
     above, label = np.divmod(held_out[0], tree.dimension.n_labels)
     leaf, episode = np.divmod(above, len(numbers))
     lengths = np.bincount(episode, held_out[1], minlength=len(numbers)).astype(np.int64)
-    return count_above(tree, leaf, episode, label, held_out[1], numbers, lengths)
+    return count_above(tree, LeafCounts(leaf, episode, label, held_out[1], numbers, lengths))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations, Feature, with_formulas
 from sarl_core.demonstrations.fields import ColumnUse
 from sarl_core.demonstrations.formats import vocabulary
-from sarl_core.demonstrations.formats.arrow.parquet_file import is_text, refusing_damage
+from sarl_core.demonstrations.formats.arrow.parquet_file import MAGIC, is_text, refusing_damage
 from sarl_core.demonstrations.formats.arrow.table import arrow_table
 from sarl_core.demonstrations.formats.columns import ColumnMap
 from sarl_core.demonstrations.formats.mapping.roles import ROLE_WORDS, Roles
@@ -24,6 +24,7 @@ from sarl_core.demonstrations.formats.missing import Missing, TooFewStepsError
 from sarl_core.demonstrations.formats.naming import naming
 from sarl_core.demonstrations.formats.recording import Recording, to_demonstrations
 from sarl_core.demonstrations.formats.sets.file_set import files_in_folder, natural_order
+from sarl_core.demonstrations.formats.sets.table_set import tables_among
 from sarl_core.demonstrations.formats.tables import recording_from_table
 from sarl_core.demonstrations.recoding import recoded
 from sarl_core.environments.description import EnvironmentDescription
@@ -35,6 +36,8 @@ ROWS = 400_000
 _FEWEST = 2
 _ENDING = ".parquet"
 _PATTERN = frozenset("*?[")
+_TAIL = 8  # bytes at the end of a Parquet file, of which the first four say how long its footer is
+_LOOKS, _LOOK = 16, 16_384  # places at which a file is looked at, and bytes of each
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,7 @@ class Piece:
         first: Number of the first row group.
         groups: How many there are.
         rows: In them.
+        mark: Of the file (`file_mark`).
     """
 
     path: str
@@ -54,6 +58,7 @@ class Piece:
     first: int
     groups: int
     rows: int
+    mark: str
 
     @property
     def name(self) -> str:
@@ -90,14 +95,16 @@ def parquet_paths(given: Sequence[str | Path]) -> list[Path]:
         From the root, in their natural order, each once.
 
     Raises:
-        InputError: If there is none, or one is no Parquet file.
+        InputError: If there is none, or one is no Parquet file; or a folder has other tables, too.
     """
     paths: list[Path] = []
     for path in map(Path, given):
         if path.is_dir():
-            paths += [path / name for name in files_in_folder(path).sizes if _is_parquet(name)]
-            if not paths:
+            files = files_in_folder(path)
+            if not any(map(_is_parquet, files.sizes)):
                 raise InputError(f"{path}: this folder holds no Parquet file; give one that does")
+            with naming(str(path)):
+                paths += [path / name for name in tables_among(files)]
         elif not path.exists() and _PATTERN.intersection(str(path)):
             root = Path(path.anchor)
             named = list(root.glob(str(path.relative_to(root))))
@@ -127,12 +134,19 @@ def pieces_of(paths: Sequence[Path]) -> list[Piece]:
         InputError: If a file is damaged, has other columns than the first, or holds too much in
             one row group; or if there is no row at all.
     """
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
     pieces: list[Piece] = []
     first: dict[str, str] = {}
     for place, path in enumerate(paths):
-        with naming(path.name), refusing_damage(), pq.ParquetFile(path) as file:
+        with (
+            naming(path.name),
+            refusing_damage(),
+            pa.OSFile(str(path)) as source,
+            pq.ParquetFile(source) as file,
+        ):
+            mark = file_mark(source)
             kinds = {
                 field.name: _kind(field.type)
                 for field in file.schema_arrow
@@ -154,32 +168,61 @@ def pieces_of(paths: Sequence[Path]) -> list[Piece]:
                 last = pieces.pop()
                 pieces.append(replace(last, groups=last.groups + groups, rows=last.rows + rows))
             else:
-                pieces.append(Piece(str(path), place, start, groups, rows))
+                pieces.append(Piece(str(path), place, start, groups, rows, mark))
     if not pieces:
         raise InputError("there are no steps in these files, only columns; give files with some")
     return pieces
 
 
+def file_mark(source: Any) -> str:
+    """What tells a Parquet file from one that was put in its place.
+
+    Its size, its end, which says of each column of each row group where it lies and what is least
+    and largest in it, and what stands at some places: a single other value may go unnoticed. When
+    the file was written says nothing: workers may each have a copy.
+
+    Args:
+        source: The opened ``pyarrow.OSFile``.
+
+    Returns:
+        A digest.
+    """
+    size = source.size()
+    source.seek(max(size - _TAIL, 0))
+    tail = source.read()
+    footer = min(int.from_bytes(tail[:4], "little"), size) if tail.endswith(MAGIC) else 0
+    digest = hashlib.blake2b(str(size).encode(), digest_size=16)
+    for start in (*range(0, size, max(size // _LOOKS, _LOOK)), max(size - _TAIL - footer, 0)):
+        source.seek(start)
+        digest.update(source.read(_LOOK if start < size - _TAIL - footer else None))
+    return digest.hexdigest()
+
+
 @contextmanager
-def opened_file(path: str) -> Iterator[Any]:
+def opened_file(path: str, mark: str = "") -> Iterator[Any]:
     """A Parquet file that was there when the work began.
 
     Args:
         path: Of the file.
+        mark: That it had then; "" where that is not known.
 
     Yields:
         A ``pyarrow.parquet.ParquetFile`` that gives texts by their dictionary.
 
     Raises:
-        InputError: If it is gone, or damaged.
+        InputError: If it is gone, damaged, or another one.
     """
+    import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
-        with refusing_damage(), pq.ParquetFile(path) as file:
-            texts = [field.name for field in file.schema_arrow if is_text(field.type)]
-        with refusing_damage(), pq.ParquetFile(path, read_dictionary=texts) as file:
-            yield file
+        with refusing_damage(), pa.OSFile(path) as source:
+            if mark and file_mark(source) != mark:
+                raise InputError("it has changed since the work began; begin anew")
+            texts = [
+                field.name for field in pq.ParquetFile(source).schema_arrow if is_text(field.type)
+            ]
+            yield pq.ParquetFile(source, read_dictionary=texts)
     except InputError as error:
         if Path(path).is_file():
             raise
@@ -221,7 +264,7 @@ def read_piece(piece: Piece, reading: Reading) -> PieceSteps | None:
         InputError: If it cannot be read, or holds something wrong; it names the file.
     """
     with naming(piece.name):
-        with opened_file(piece.path) as file:
+        with opened_file(piece.path, piece.mark) as file:
             groups = list(range(piece.first, piece.first + piece.groups))
             table = file.read_row_groups(groups, use_threads=False)
         recording = recording_from_table(arrow_table(table), reading.columns, reading.description)

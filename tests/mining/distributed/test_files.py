@@ -171,6 +171,12 @@ def test_folders_without_steps(tmp_path: Path, mine: Mine) -> None:
     (tmp_path / "log.csv").write_text("obs_a,action\n1,0\n")
     with pytest.raises(InputError, match="a cluster reads Parquet files; write it as one"):
         parquet_paths([tmp_path / "log.csv"])
+    mixed = folder_of(tmp_path / "mixed", steps())
+    (mixed / "notes.json").write_text("{}")
+    assert [path.suffix for path in parquet_paths([mixed])] == [".parquet"]
+    (mixed / "log.csv").write_text("obs_a,action\n1,0\n")
+    with pytest.raises(InputError, match=r"mixed: it holds files of several formats, .*log.csv"):
+        parquet_paths([mixed])
 
 
 def test_damaged_and_vanished_files(tmp_path: Path, mine: Mine) -> None:
@@ -178,6 +184,10 @@ def test_damaged_and_vanished_files(tmp_path: Path, mine: Mine) -> None:
     (piece, _) = pieces.pieces_of(parquet_paths([folder]))
     (folder / "log-0.parquet").unlink()
     with pytest.raises(InputError, match=r"log-0.parquet: it is gone since the work began; put"):
+        read_piece(piece, Reading())
+    other = steps()
+    other.assign(action=2 - other.action).to_parquet(folder / "log-0.parquet")
+    with pytest.raises(InputError, match=r"log-0.parquet: it has changed since the work began"):
         read_piece(piece, Reading())
     second = folder / "log-1.parquet"
     second.write_bytes(second.read_bytes()[:-40])

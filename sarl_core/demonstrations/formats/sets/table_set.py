@@ -110,7 +110,7 @@ def open_tables(files: FileSet) -> tuple[Table, tuple[str, ...]]:
     Raises:
         InputError: If there are none, files of several formats, or files whose columns differ.
     """
-    paths = _tables_among(files)
+    paths = tables_among(files)
     tables: list[Table] = []
     contents = files.contents(paths)
     for path in paths:
@@ -147,8 +147,18 @@ def one_set_note(paths: Sequence[str]) -> str:
     return f"{len(paths):,} files were read as one set, from {first!r} to {last!r}"
 
 
-def _tables_among(files: FileSet) -> list[str]:
-    """The files to read: those of the one format that tables are in."""
+def tables_among(files: FileSet) -> list[str]:
+    """Those of the one format that tables are in.
+
+    Args:
+        files: Of which others than tables are left alone.
+
+    Returns:
+        Their paths.
+
+    Raises:
+        InputError: If there are none, or of several formats.
+    """
     by_kind: dict[str, list[str]] = {}
     for path in files.sizes:
         form = FORMATS.get(extension_of(path))
