@@ -14,9 +14,10 @@ from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future
 from contextlib import closing
 from functools import cache
 from threading import Lock, Thread
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 from sarl_core.errors import SarlError, WorkError
+from sarl_core.memory import LARGE
 from sarl_core.progress import CancelledError, Progress, report
 
 _UNSAID = 15  # calls that an executor works on at once which does not say how many they are
@@ -24,8 +25,8 @@ _IDLE_SECONDS = 300  # after which a process that nobody needs ends
 _LOOK_SECONDS = 0.5  # between two looks at whether the caller still wants it
 _PARENT_SECONDS = 2.0  # between two looks at whether the process that asked is still there
 _LOST = "a process ended unexpectedly, as when memory runs out; run again"
-# GNU's C library gives large arrays back at once where it does not choose by itself which they are.
-_ALLOCATION = {"MALLOC_MMAP_THRESHOLD_": str(2**20)}
+# As `give_back_large_arrays` has it, and from the first array on.
+_ALLOCATION = {"MALLOC_MMAP_THRESHOLD_": str(LARGE)}
 _NICENESS = 5  # whoever serves pages goes first, and the work goes on all the same
 
 Key = TypeVar("Key", bound=Hashable)
@@ -156,6 +157,7 @@ def completed(
     calls: Iterable[tuple[Key, Callable[..., Result], tuple[Any, ...]]],
     *,
     lost: str,
+    at_once: int | None = None,
 ) -> Generator[list[tuple[Key, Result | SarlError]], None, None]:
     """Make calls, and hand over what is done as it is done.
 
@@ -166,6 +168,7 @@ def completed(
         calls: What they are known by, a function that processes can find, and its arguments. The
             next one is asked for when there is room for it.
         lost: The sentence for when a process ended in the middle of its work.
+        at_once: How many calls are worked on at most, where each takes much memory.
 
     Yields:
         What was done since the last time, with the errors that are sentences; now and then nothing.
@@ -174,12 +177,12 @@ def completed(
         WorkError: If a process ended in the middle of its work.
         CancelledError: If the program ends and takes no more work.
     """
-    # One more than are worked on, so that nobody waits for this loop; not all at once, so that
-    # another caller's come in between, and since each carries its arguments along.
-    most = workers_of(executor) + 1
     waiting = iter(calls)
     running: dict[Future[Result], Key] = {}
     try:
+        # One more than are worked on, so that nobody waits for this loop; not all at once, so that
+        # another caller's come in between, and since each carries its arguments along.
+        most = workers_of(executor) + 1 if at_once is None else at_once
         while True:
             while len(running) < most and (call := next(waiting, None)) is not None:
                 key, work, arguments = call
@@ -188,8 +191,10 @@ def completed(
                 return
             ready, _ = wait(running, timeout=_LOOK_SECONDS, return_when=FIRST_COMPLETED)
             yield [(running.pop(future), _outcome(future)) for future in ready]
-    except (BrokenExecutor, *getattr(executor, "losses", ())) as error:
+    except BrokenExecutor as error:
         raise WorkError(lost) from error
+    except getattr(executor, "losses", ()) as error:
+        raise WorkError(cast(Any, executor).loss_text(error, lost)) from error
     finally:
         for future in running:
             future.cancel()
@@ -220,6 +225,7 @@ def run_each(
     *,
     lost: str = _LOST,
     executor: Executor | None = None,
+    at_once: int | None = None,
     progress: Progress | None = None,
 ) -> list[Result]:
     """Do the same with different arguments.
@@ -229,6 +235,7 @@ def run_each(
         tasks: The arguments of each call.
         lost: The sentence for when a process ended in the middle of its work.
         executor: Its processes do the work; here, one after the other, where there is none.
+        at_once: How many calls they work on at most, where each takes much memory.
         progress: Told how many are done; may stop the rest.
 
     Returns:
@@ -247,7 +254,7 @@ def run_each(
         return done
     results: dict[int, Result] = {}
     calls = ((place, work, task) for place, task in enumerate(tasks))
-    with closing(completed(executor, calls, lost=lost)) as batches:
+    with closing(completed(executor, calls, lost=lost, at_once=at_once)) as batches:
         for batch in batches:
             for place, result in batch:
                 if isinstance(result, SarlError):

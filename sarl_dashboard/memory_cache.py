@@ -7,7 +7,7 @@ import sys
 from collections import Counter, OrderedDict
 from collections.abc import Iterable
 from threading import Lock
-from typing import Generic, NamedTuple, TypeVar, cast
+from typing import Any, Generic, NamedTuple, TypeVar, cast
 
 import numpy as np
 import pandas as pd
@@ -22,6 +22,7 @@ _BYTES_PER_SIGN = 80  # of a formula
 _LOOKING = 5  # holders of a value by that alone that it is looked at
 _LARGE = 2**20  # bytes of a part that may be held by several entries
 _BARE = (dict, tuple, list, set, frozenset)  # made anew for each of those, with the same in them
+_BUFFERS = (np.ndarray, memoryview, bytearray, bytes)
 _LOOKED_AT = 64  # of a long sequence: what its entries take follows from so many
 
 
@@ -165,8 +166,12 @@ class _Scale:
         if isinstance(value, np.ndarray):
             if value.base is None:
                 return int(value.nbytes)
-            below = self.size(value.base)
-            return 0 if id(value.base) in self.parts else max(value.nbytes, below)
+            base: Any = value.base
+            # What another process sent is a view of a view of what came.
+            while isinstance(base, np.ndarray) and isinstance(base.base, _BUFFERS):
+                base = base.base
+            below = self.size(base)
+            return 0 if id(base) in self.parts else max(value.nbytes, below)
         if isinstance(value, (pd.DataFrame, pd.Series)):
             return int(np.sum(value.memory_usage(deep=False)))
         if isinstance(value, (str, bytes, bytearray)):

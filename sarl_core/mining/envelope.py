@@ -96,16 +96,22 @@ def box_of(rule: Rule, observations: NDArray[np.float32]) -> DataBox | None:
 def _boxes(
     applied: Applications, observations: NDArray[np.float32], n_rules: int
 ) -> list[DataBox | None]:
-    """One sort a feature; the quantiles of all rules are then picked at once."""
+    """One sort a feature; the quantiles of all rules are then picked at once.
+
+    Applications ascend by rule, so that sorted values of a rule take the places of its states.
+    """
     count = np.bincount(applied.rule, minlength=n_rules)
     there = np.flatnonzero(count)
     count = count[there]
     start = np.cumsum(count) - count
     d = observations.shape[1]
     corners: Floats = np.empty((4, len(there), d))
+    groups = list(zip(start.tolist(), (start + count).tolist(), strict=True))
     for feature in range(d):
         values = observations[applied.row, feature]
-        ordered = values[np.lexsort((values, applied.rule))].astype(np.float64)
+        for first, end in groups:
+            values[first:end].sort()
+        ordered = values.astype(np.float64)
         # A formula may be infinite, which no file can say: the largest number stands for it.
         ordered = np.clip(ordered, -_LARGEST, _LARGEST)
         corners[0, :, feature] = ordered[start]
@@ -113,6 +119,7 @@ def _boxes(
         corners[2, :, feature] = _quantile(ordered, start, count, HIGH_QUANTILE)
         corners[3, :, feature] = ordered[start + count - 1]
     boxes: list[DataBox | None] = [None] * n_rules
+    corners += 0.0  # of two zeros one
     for place, sides in zip(there.tolist(), np.moveaxis(corners, 1, 0).tolist(), strict=True):
         boxes[place] = DataBox(*sides)
     return boxes

@@ -25,7 +25,11 @@ _LOOK_SECONDS = 1.0
 
 
 def elsewhere_notice(
-    thresholds: Thresholds, fidelity: float, more: Callable[[Judged], Markup] = lambda _: Markup()
+    thresholds: Thresholds,
+    fidelity: float,
+    more: Callable[[Judged], Markup] = lambda _: Markup(),
+    *,
+    missed: bool = False,
 ) -> None:
     """What is known of the rules in other episodes, and a warning where that is much less.
 
@@ -33,6 +37,8 @@ def elsewhere_notice(
         thresholds: At which they were mined.
         fidelity: On what they were mined from.
         more: HTML to stand below.
+        missed: Whether what stands above was drawn before it was known, so that it would go on
+            without it where that has come since.
     """
     demonstrations = chosen_demonstrations()
     if demonstrations is None or not rule_base.at_thresholds():
@@ -45,7 +51,13 @@ def elsewhere_notice(
         return
     divider = chosen_divider()
     key = cross_fitting.key_of(demonstrations, divider)
-    waiting = key not in RESULTS
+    if thresholds.support < cross_fitting.least_support(demonstrations):
+        st.caption(
+            f"What rules of fewer than {cross_fitting.FEWEST_STATES} states are worth in other "
+            "episodes is not found out where there are so many steps."
+        )
+        return
+    waiting = missed or key not in RESULTS
 
     @st.fragment(run_every=_LOOK_SECONDS if waiting else None)
     def as_soon_as_it_is_there() -> None:
@@ -61,7 +73,7 @@ def elsewhere_notice(
             st.caption(
                 in_full(f"what the rules are worth in other episodes is not known: {job.error}")
             )
-        elif takes_minutes and (job is None or job.cancelled):
+        elif takes_minutes and (job is None or not job.running):
             st.button(
                 "Find out what they are worth in other episodes",
                 key="elsewhere",

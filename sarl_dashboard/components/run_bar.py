@@ -93,15 +93,19 @@ def run_bar(
         st.info(offer.cancelled, icon=":material/pause_circle:")
 
 
-def watched(place: Place[Any], draw: Callable[[bool], None], *, seconds: float = 1.0) -> None:
+def watched(
+    place: Place[Any], draw: Callable[[bool], None], *, seconds: float = 1.0, missed: bool = False
+) -> None:
     """Draw what work beside the page changes, anew as long as it goes on.
 
     Args:
         place: Of the work.
         draw: Draws it; told whether the work goes on.
         seconds: Until it is drawn again.
+        missed: Whether the work went on when the page looked for its result, so that its end would
+            be missed where it came since.
     """
-    job, at_work = place.job, place.at_work
+    job, at_work = place.job, missed or place.at_work
 
     @st.fragment(run_every=seconds if at_work else None)
     def watch() -> None:

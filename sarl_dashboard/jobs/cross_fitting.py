@@ -11,6 +11,7 @@ import time
 from concurrent.futures import Executor
 
 from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.errors import WorkError
 from sarl_core.mining.distributed.mined_data import MinedData
 from sarl_core.mining.never.never_rules import mine_at
 from sarl_core.mining.rules import Thresholds
@@ -21,12 +22,16 @@ from sarl_core.progress import Progress, report
 from sarl_dashboard.cache import RESULTS, cached, keep, owner
 from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.mining import mining
+from sarl_dashboard.memory_cache import size_of
 from sarl_dashboard.state import combining, rule_base
 from sarl_dashboard.state.data import chosen_demonstrations, mined_data
 from sarl_dashboard.state.mined import learner_of
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider
 
 UNASKED = 250_000  # steps up to which it is made without being asked for
+FEWEST_STATES = 20
+"""Of a rule, where there are more steps: what is known of smaller ones takes most of the room."""
+_MOST_SHARE = 0.75  # of the room for all results: the rest is for what it is about
 PLACE = Place[CrossFit]("elsewhere")
 DRAWING = 2.0  # seconds in which a browser draws a page; processes that start would hinder it
 _LOOK_SECONDS = 0.05  # between two looks at whether it is still wanted
@@ -54,7 +59,9 @@ def judged(thresholds: Thresholds) -> Judged | None:
     if mined is not None:
         return _judged_in_file(mined, thresholds) if rule_base.at_thresholds() else None
     fit = known()
-    return None if fit is None else _judged(fit, thresholds)
+    if fit is None or thresholds.support < fit.least_support:
+        return None
+    return _judged(fit, thresholds)
 
 
 def known() -> CrossFit | None:
@@ -66,6 +73,12 @@ def known() -> CrossFit | None:
         return None
     fit = RESULTS.get(key_of(demonstrations, chosen_divider()))
     return fit if isinstance(fit, CrossFit) else None
+
+
+def least_support(demonstrations: Demonstrations) -> float:
+    """Of rules of which it is found out what they are worth elsewhere."""
+    steps = len(demonstrations)
+    return FEWEST_STATES / steps if steps > UNASKED else 0.0
 
 
 def _trees_of(fit: CrossFit) -> tuple[str, ...]:
@@ -114,6 +127,7 @@ def begin(demonstrations: Demonstrations, divider: int, *, after: float = 0.0) -
     """
     key, session = key_of(demonstrations, divider), owner()
     combined, learner = combining.pairs(demonstrations), learner_of(demonstrations)
+    least = least_support(demonstrations)
 
     def work(executor: Executor, progress: Progress) -> CrossFit:
         _wait(after, progress)
@@ -122,11 +136,21 @@ def begin(demonstrations: Demonstrations, divider: int, *, after: float = 0.0) -
             divider=divider,
             combined=combined,
             learner=learner,
+            min_support=least,
             executor=executor,
+            at_once=1 if len(demonstrations) > UNASKED else None,
             progress=progress,
         )
 
-    PLACE.begin(lambda: mining(key, work, lambda fit: keep(key, fit, session)))
+    def keep_fit(fit: CrossFit) -> None:
+        if (size := size_of(fit.folds)) > _MOST_SHARE * RESULTS.most_bytes:
+            raise WorkError(
+                f"it takes {size / 1e6:,.0f} MB, and the dashboard keeps "
+                f"{RESULTS.most_bytes / 1e6:,.0f} MB in all (SARL_CACHE_MB, for whoever runs it)"
+            )
+        keep(key, fit, session)
+
+    PLACE.begin(lambda: mining(key, work, keep_fit))
 
 
 def _wait(seconds: float, progress: Progress) -> None:

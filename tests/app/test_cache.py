@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 import threading
 from collections.abc import Callable
@@ -56,6 +57,14 @@ def test_sizes_are_about_right(value: object, size: float) -> None:
 def test_what_is_in_a_thing_twice_is_counted_once() -> None:
     whole = megabytes(1)
     assert size_of([whole, whole, (whole,)]) == pytest.approx(MEGABYTE, rel=0.01)
+
+
+def test_what_another_process_sent_is_counted_once() -> None:
+    sent = [megabytes(4), megabytes(4)]
+    for protocol in (2, 4, pickle.HIGHEST_PROTOCOL):
+        came = pickle.loads(pickle.dumps(sent, protocol=protocol))
+        assert size_of(came) == pytest.approx(size_of(sent), rel=0.01)
+        assert size_of([came, came[0][1:]]) == pytest.approx(size_of(sent), rel=0.01)
 
 
 def test_what_many_share_is_counted_about_once() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from functools import cache
+from html import unescape
 from typing import Any
 
 import numpy as np
@@ -36,10 +37,14 @@ def until(app: AppTest, words: str) -> None:
     for _ in range(600):
         app.run()
         assert not app.exception, app.exception
-        if words in html(app):
+        if words in html(app) + captions(app):
             return
         time.sleep(0.2)
     raise AssertionError(html(app))
+
+
+def captions(app: AppTest) -> str:
+    return "\n".join(unescape(str(caption.value).replace("\\", "")) for caption in app.caption)
 
 
 def deltas(app: AppTest) -> dict[str, str]:
@@ -65,6 +70,24 @@ def test_the_numbers_of_other_episodes_stand_beside_those_mined_from() -> None:
         app.switch_page(f"{page}.py").run()
         assert judged_sentence(found) in html(app)
         assert "believe the second number" in app.warning[0].value
+
+
+def test_what_comes_while_the_page_is_drawn_stands_in_the_numbers_too(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    open_page("thresholds", data="cartpole")
+    module = sys.modules["sarl_dashboard.jobs.cross_fitting"]
+    known = module.judged
+    looked = []
+
+    def looked_up_too_soon(thresholds: Thresholds) -> Judged | None:
+        looked.append(thresholds)
+        return None if len(looked) == 1 else known(thresholds)
+
+    until(open_page("thresholds", data="cartpole"), "mined without it, they are right in")
+    monkeypatch.setattr(module, "judged", looked_up_too_soon)
+    app = open_page("thresholds", data="cartpole")
+    assert deltas(app).keys() == {"Coverage", "Fidelity"}
 
 
 @pytest.mark.parametrize("episodes", [12, 1])
@@ -103,7 +126,7 @@ def test_compact_rules_are_not_mined_again() -> None:
 
 
 def test_what_takes_minutes_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    app = open_page("thresholds", data="pendulum")
+    open_page("names", data="pendulum")  # where nothing is begun beside the page
     module = sys.modules["sarl_dashboard.jobs.cross_fitting"]
     monkeypatch.setattr(module, "UNASKED", 1_000)
     module.RESULTS.clear()
@@ -124,3 +147,24 @@ def test_what_takes_minutes_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> Non
     app.button(key="elsewhere").click().run()
     until(app, "mined without it, they are right in")
     assert not [button for button in app.button if button.key == "elsewhere"]
+
+
+def test_of_many_steps_rules_of_few_states_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    open_page("names", data="pendulum")
+    module = sys.modules["sarl_dashboard.jobs.cross_fitting"]
+    monkeypatch.setattr(module, "UNASKED", 1_000)
+    monkeypatch.setattr(module, "_MOST_SHARE", 0.0)
+    module.RESULTS.clear()
+    app = open_page("thresholds", data="pendulum")
+    app.button(key="elsewhere").click().run()
+    until(app, "it takes")  # more than there is room for
+    assert "(SARL_CACHE_MB, for whoever runs it)" in captions(app)
+    assert "mined without it" not in html(app)
+    monkeypatch.setattr(module, "_MOST_SHARE", 1.0)
+    app = open_page("thresholds", data="pendulum")
+    app.button(key="elsewhere").click().run()
+    until(app, "mined without it, they are right in")
+    app.button(key="unfiltered").click().run()
+    assert not deltas(app)
+    assert "What rules of fewer than 20 states are worth in other episodes" in captions(app)
+    assert "mined without it" not in html(app)

@@ -326,7 +326,7 @@ def test_a_fold_has_no_say_in_what_is_combined_for_it() -> None:
     fit = cross_fit(combined, combined=pairs, folds=3)
     numbers = set(plain.episodes.tolist())
     for fold in fit.folds:
-        without = numbers - set(fold.counts[0].numbers.tolist())
+        without = numbers - set(fold.leaves[0].numbers.tolist())
         own = with_combinations(plain.select(sorted(without)), pairs=pairs)
         assert fold.trees[0].source.features == own.features
     assert pairs_chosen_from(combined, divider=2) == pairs

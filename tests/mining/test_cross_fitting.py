@@ -14,6 +14,7 @@ from scipy import stats
 from sarl_core import Demonstrations, InputError, grow_policy_trees, mine_rules
 from sarl_core.mining.evidence import HeldOut
 from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.tree import LEAF
 from sarl_core.mining.validation.cross_fitting import Judged, cross_fit, judge, parts
 from sarl_core.mining.validation.episode_counts import (
     count_nodes,
@@ -162,6 +163,30 @@ def told(share, high):
 )
 def test_numbers_part_where_one_lies_clearly_lower(mined, elsewhere, expected):
     assert parts(mined, elsewhere) is expected
+
+
+@pytest.mark.parametrize("learner", ["exact", "histogram"])
+def test_rules_of_many_states_are_known_without_the_others(lander_like, learner):
+    whole = cross_fit(lander_like, folds=4, learner=learner)
+    short = cross_fit(lander_like, folds=4, learner=learner, min_support=0.02)
+    assert (whole.least_support, short.least_support) == (0.0, 0.02)
+    for full, cut in zip(whole.folds, short.folds, strict=True):
+        (large,), (small,) = full.trees, cut.trees
+        assert 1 < small.n_nodes < large.n_nodes / 2
+        assert small.learner == large.learner == learner
+        assert (small.samples[small.feature != LEAF] >= 0.02 * len(small.sample_order)).all()
+        (few,), (many,) = next(cut.counts()), next(full.counts())
+        assert few.samples.sum() < many.samples.sum()
+    for thresholds in (Thresholds(0.02, 0.7), Thresholds(0.05, 0.0), Thresholds(0.3, 0.5)):
+        some, others = whole.at(thresholds), short.at(thresholds)
+        assert some.covered.sum() > 0
+        for name in ("numbers", "lengths", "decisions", "covered", "correct"):
+            assert getattr(some, name).tolist() == getattr(others, name).tolist()
+    with pytest.raises(InputError, match=r"from a support of 0.02 on, and the minimum support is"):
+        short.at(Thresholds(0.01, 0.7))
+    for wrong in (-0.1, 1.5):
+        with pytest.raises(InputError, match=f"the least support is {wrong:g}; give 0 to 1"):
+            cross_fit(lander_like, folds=4, min_support=wrong)
 
 
 # --- counts at the nodes, and influence -----------------------------------------------------------

@@ -7,12 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
 
 from sarl_core import Demonstrations, InputError, grow_policy_trees, mine_rules
-from sarl_core.mining.envelope import with_boxes
+from sarl_core.mining.envelope import box_of, with_boxes
 from sarl_core.mining.rule_set import rules_from_json, rules_to_json
 from sarl_core.mining.rules import Condition
 from tests.mining.strategies import labelled_states
+
+
+def mined_rule():
+    states = np.arange(8, dtype=np.float32)[:, None]
+    labels = (states[:, 0] > 3).astype(int)
+    return mine_rules(
+        Demonstrations(states, labels, np.zeros(8, int)), supp_min=0.0, conf_min=1.0
+    ).rules[0]
 
 
 def expect_boxes(rule_set, demonstrations):
@@ -47,6 +57,23 @@ def test_boxes_of_real_numbers_and_of_rules_that_a_person_placed(lander_like):
     mixed = with_boxes(replace(mined, rules=(manual, nowhere, *mined.rules)), lander_like)
     assert mixed.rules[1].box is None
     expect_boxes(mixed, lander_like)
+
+
+@given(hnp.arrays(np.float32, (40, 2), elements=st.floats(-(2.0**99), 2.0**99, width=32)))
+def test_boxes_of_numbers_of_any_size_and_sign(states):
+    states[:3, 0] = -0.0, 0.0, -1e-45
+    pairs = Demonstrations(states, np.arange(40) % 2, np.zeros(40, int))
+    expect_boxes(mine_rules(pairs, supp_min=0.0, conf_min=0.5), pairs)
+
+
+def test_what_is_no_number_lies_beyond_all_others_whatever_its_sign():
+    values = np.array([3.0, -np.nan, -np.inf, np.nan, 0.0, np.inf], dtype=np.float32)
+    values[1] = np.copysign(values[1], np.float32(-1))
+    everywhere = replace(mined_rule(), conditions=())
+    box = box_of(everywhere, values[:, None])
+    assert (box.least, np.isnan(box.most).tolist()) == ((float(np.finfo(np.float32).min),), [True])
+    finite = box_of(everywhere, values[[0, 2, 4, 5], None])
+    assert finite.most == (float(np.finfo(np.float32).max),)
 
 
 def test_trees_alone_have_no_states_and_so_no_boxes(lander_like):

@@ -9,6 +9,7 @@ import pytest
 
 from sarl_core import Demonstrations, grow_policy_trees, mine_rules
 from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.validation import cross_fitting
 from sarl_core.mining.validation import recommendation as module
 from sarl_core.mining.validation.cross_fitting import CrossFit, Fold, cross_fit
 from sarl_core.mining.validation.recommendation import (
@@ -99,13 +100,35 @@ def test_what_it_is_worth_comes_from_episodes_that_did_not_choose_it(lander_like
     trees, fit = grow_policy_trees(lander_like), cross_fit(lander_like, folds=4, seed=2)
     shares = []
     for fold in fit.folds:
-        own = fold.counts[0].numbers
+        own = fold.leaves[0].numbers
         at, _ = chosen_pair(tried(trees, fit, without=own.tolist()))
         judged = fit.at(at)
         here = np.isin(judged.numbers, own) & (judged.covered > 0)
         shares += (judged.correct[here] / judged.covered[here]).tolist()
     assert len(shares) == 20
     assert recommended(trees, fit).unseen == pytest.approx(np.mean(shares))
+
+
+@pytest.mark.usefixtures("few_steps")
+def test_episodes_that_are_counted_some_after_others_recommend_the_same(lander_like, monkeypatch):
+    trees, fit = grow_policy_trees(lander_like), cross_fit(lander_like, folds=4)
+    whole, (every,) = recommended(trees, fit), next(fit.folds[0].counts())
+    monkeypatch.setattr(cross_fitting, "_STEPS_AT_ONCE", -(-int(every.lengths.sum()) // 2))
+    first, second = (some for (some,) in fit.folds[0].counts())
+    assert [*first.numbers, *second.numbers] == every.numbers.tolist()
+    assert first.samples.sum() + second.samples.sum() == every.samples.sum()
+    parted = recommended(trees, fit)
+    assert (parted.thresholds, parted.rules) == (whole.thresholds, whole.rules)
+    for name in ("coverage", "fidelity", "best", "unseen"):
+        assert getattr(parted, name) == pytest.approx(getattr(whole, name), abs=1e-12)
+
+
+def test_nothing_is_recommended_of_which_nothing_is_known(lander_like):
+    trees = grow_policy_trees(lander_like)
+    free = recommended(trees, cross_fit(lander_like, folds=4))
+    least = 1.5 * free.thresholds.support
+    bound = recommended(trees, cross_fit(lander_like, folds=4, min_support=least))
+    assert bound.thresholds.support >= least > free.thresholds.support > 0.0
 
 
 @pytest.mark.usefixtures("few_steps")
@@ -117,7 +140,7 @@ def test_one_action_dimension_is_recommended_for_alone(two_actions):
         alone = mine_rules((trees[dimension],), supp_min=at.support, conf_min=at.confidence)
         assert one.rules == alone.rule_count
         only = CrossFit(
-            tuple(Fold((fold.trees[dimension],), (fold.counts[dimension],)) for fold in fit.folds),
+            tuple(Fold((fold.trees[dimension],), (fold.leaves[dimension],)) for fold in fit.folds),
             True,
             fit.parted,
         )

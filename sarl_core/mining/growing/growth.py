@@ -238,7 +238,7 @@ def counted_trees(
             leaves=one.leaves,
         )
         is_cut = learner == "exact" and least > 2
-        cut = _cut_back(tree, least, demonstrations) if is_cut else tree
+        cut = cut_back(tree, least, demonstrations) if is_cut else tree
         return replace(cut, least_support=float(min_support))
 
     return tuple(counted(index, one) for index, one in enumerate(grown))
@@ -281,11 +281,19 @@ def fewest_pairs(min_support: float, pairs: int) -> int:
     return next(some for some in (least - 1, least, least + 1) if some / pairs >= min_support)
 
 
-def _cut_back(tree: PolicyTree, least: int, demonstrations: Demonstrations) -> PolicyTree:
+def cut_back(tree: PolicyTree, least: int, demonstrations: Demonstrations) -> PolicyTree:
     """A tree of which no node with fewer pairs is split.
 
     scikit-learn would stop there by itself, but then choose otherwise among equally good queries
     of the nodes that follow: the rules would be others.
+
+    Args:
+        tree: Fully grown.
+        least: How many pairs.
+        demonstrations: That it was counted over.
+
+    Returns:
+        The rest of it, counted; `least_support` is as it was.
     """
     is_split = (tree.feature != LEAF) & (tree.samples >= least)
     left = np.where(is_split, tree.children_left, LEAF)
@@ -299,5 +307,7 @@ def _cut_back(tree: PolicyTree, least: int, demonstrations: Demonstrations) -> P
         children_left=place[left[stays]],
         children_right=place[right[stays]],
     )
-    cut = count_tree(structure, demonstrations, tree.index, divider=tree.divider)
+    cut = count_tree(
+        structure, demonstrations, tree.index, divider=tree.divider, learner=tree.learner
+    )
     return replace(cut, number=stays)

@@ -11,9 +11,10 @@ them there is `hold_out` alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +26,15 @@ from sarl_core.mining.algorithm_1 import cut_nodes
 from sarl_core.mining.combining.candidates import Pair
 from sarl_core.mining.combining.choice import chosen_again
 from sarl_core.mining.evidence import EpisodeCounts, HeldOut, held_out_of
-from sarl_core.mining.growing.growth import grow_policy_trees
+from sarl_core.mining.growing.growth import cut_back, fewest_pairs, grow_policy_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import Learner, PolicyTree
 from sarl_core.mining.validation.episode_counts import (
     Influence,
-    count_nodes,
+    LeafCounts,
+    count_above,
+    count_leaves,
     count_together,
     most_influential,
 )
@@ -42,6 +45,7 @@ FOLDS = 10
 """Enough that each tree is grown from nearly as many episodes as all together are."""
 FEWER_FOLDS, MANY_STEPS = 5, 100_000
 """Of so many steps a tree takes its time and its room, and a fifth less of them are still many."""
+_STEPS_AT_ONCE = 25_000  # that are counted at all nodes: some hundred megabytes of a deep tree
 PARTING = 0.03
 """From so much on, the number on what was mined from is said to part from the other."""
 
@@ -54,11 +58,24 @@ class Fold:
 
     Attributes:
         trees: One an action dimension.
-        counts: Those episodes at their nodes.
+        leaves: Those episodes at their leaves.
     """
 
     trees: tuple[PolicyTree, ...]
-    counts: tuple[EpisodeCounts, ...]
+    leaves: tuple[LeafCounts, ...]
+
+    def counts(self) -> Iterator[tuple[EpisodeCounts, ...]]:
+        """Those episodes at all nodes, some episodes after others.
+
+        At all nodes they take many times as much memory as at leaves.
+        """
+        lengths = self.leaves[0].lengths
+        pieces = min(len(lengths), -(-int(lengths.sum()) // _STEPS_AT_ONCE))
+        for some in np.array_split(np.arange(len(lengths)), pieces):
+            yield tuple(
+                count_above(tree, leaves.of(int(some[0]), int(some[-1]) + 1))
+                for tree, leaves in zip(self.trees, self.leaves, strict=True)
+            )
 
     def at(self, thresholds: Thresholds) -> Judged:
         """What those episodes say of the rules at some thresholds.
@@ -69,23 +86,12 @@ class Fold:
         Returns:
             The same as `judge` of these rules.
         """
-        first = self.counts[0]
-        samples, correct = np.zeros((2, len(first.numbers)), dtype=np.int64)
-        for tree, counts in zip(self.trees, self.counts, strict=True):
-            chosen = np.zeros(tree.n_nodes, dtype=np.bool_)
-            chosen[
-                cut_nodes(
-                    tree,
-                    supp_min=thresholds.support,
-                    conf_min=thresholds.confidence,
-                    lift_min=thresholds.lift,
-                    max_depth=thresholds.max_depth,
-                )
-            ] = True
-            some, right = counts.together(chosen)
-            samples, correct = samples + some, correct + right
-        decisions = first.lengths * len(self.trees)
-        return Judged(first.numbers, first.lengths, decisions, samples, correct)
+        first = self.leaves[0]
+        together = [
+            partial(leaves.together, tree)
+            for tree, leaves in zip(self.trees, self.leaves, strict=True)
+        ]
+        return judged_at(thresholds, self.trees, together, first.numbers, first.lengths)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,11 +103,14 @@ class CrossFit:
         whole_episodes: Whether these are episodes; else there was one only, and they are
             stretches of it, which are alike.
         parted: The pairs, in these episodes.
+        least_support: Of rules that are known. Where it is not 0, nothing is known of the rules at
+            a lower minimum support.
     """
 
     folds: tuple[Fold, ...]
     whole_episodes: bool
     parted: Demonstrations
+    least_support: float = 0.0
 
     def at(self, thresholds: Thresholds) -> Judged:
         """What is known of the rules at some thresholds.
@@ -111,21 +120,29 @@ class CrossFit:
 
         Returns:
             The same as mining at them once for each fold gives.
+
+        Raises:
+            InputError: If the minimum support is less than `least_support`.
         """
+        if thresholds.support < self.least_support:
+            raise InputError(
+                f"these trees know rules from a support of {self.least_support:g} on, and the "
+                f"minimum support is {thresholds.support:g}; fit without min_support"
+            )
         return self._together([fold.at(thresholds) for fold in self.folds])
 
     def of(self, mine: Callable[[Sequence[PolicyTree]], RuleSet]) -> Judged:
         """What is known of rules of any kind, such as those that forbid.
 
         Args:
-            mine: Mines them from trees, one an action dimension.
+            mine: Mines them from trees, one an action dimension; of `least_support` at least.
 
         Returns:
             As `at`; it is called once for each fold.
         """
         return self._together(
             [
-                judge_pairs(mine(fold.trees), self.parted.select(fold.counts[0].numbers))
+                judge_pairs(mine(fold.trees), self.parted.select(fold.leaves[0].numbers))
                 for fold in self.folds
             ]
         )
@@ -194,6 +211,43 @@ class Judged:
         return most_influential(self.covered, self.correct, self.numbers, self.lengths, by="states")
 
 
+def judged_at(
+    thresholds: Thresholds,
+    trees: Sequence[PolicyTree],
+    together: Sequence[Callable[[NDArray[np.bool_]], tuple[Integers, Integers]]],
+    numbers: Integers,
+    lengths: Integers,
+) -> Judged:
+    """The rules that trees are cut to, in episodes that were counted at their nodes.
+
+    Args:
+        thresholds: At which the trees are cut.
+        trees: One an action dimension, with n nodes each.
+        together: Of each tree, what gives the pairs of each episode at some nodes (n,) that do not
+            lie above one another, and those of them that are right, (E,) each.
+        numbers: What the episodes are called, (E,).
+        lengths: Their steps, (E,).
+
+    Returns:
+        The same as `judge` of these rules.
+    """
+    samples, correct = np.zeros((2, len(numbers)), dtype=np.int64)
+    for tree, counted in zip(trees, together, strict=True):
+        chosen = np.zeros(tree.n_nodes, dtype=np.bool_)
+        chosen[
+            cut_nodes(
+                tree,
+                supp_min=thresholds.support,
+                conf_min=thresholds.confidence,
+                lift_min=thresholds.lift,
+                max_depth=thresholds.max_depth,
+            )
+        ] = True
+        some, right = counted(chosen)
+        samples, correct = samples + some, correct + right
+    return Judged(numbers, lengths, lengths * len(trees), samples, correct)
+
+
 def judge(rule_set: RuleSet, counts: EpisodeCounts) -> Judged:
     """A whole rule set on episodes that were held out.
 
@@ -246,7 +300,9 @@ def cross_fit(
     seed: int = 0,
     combined: Sequence[Pair] = (),
     learner: Learner = "exact",
+    min_support: float = 0.0,
     executor: Executor | None = None,
+    at_once: int | None = None,
     progress: Progress | None = None,
 ) -> CrossFit:
     """Grow trees without each fold of the episodes, and send the fold down them.
@@ -261,17 +317,23 @@ def cross_fit(
         combined: Pairs of features that rules may combine. Where there are some, each fold's trees
             choose their own combinations of them: the fold has no say in that either.
         learner: What grows the trees.
+        min_support: Least share of the pairs, 0 to 1, of rules that are to be known: fully grown
+            trees of very many pairs take several times as much memory.
         executor: Its processes grow the trees.
+        at_once: How many folds they work on at most; each takes much memory where pairs are many.
         progress: Told how many folds are done; may stop the rest.
 
     Returns:
         What `CrossFit.at` asks at any thresholds.
 
     Raises:
-        InputError: If there are fewer than two folds, or too few steps for two.
+        InputError: If there are fewer than two folds, or too few steps for two; or if the support
+            is no share.
         CancelledError: If the caller wants no more.
     """
     require_every_step(demonstrations, "judging rules in other episodes")
+    if not 0.0 <= min_support <= 1.0:
+        raise InputError(f"the least support is {min_support:g}; give 0 to 1")
     if folds is None:
         folds = FOLDS if len(demonstrations) < MANY_STEPS else FEWER_FOLDS
     if folds < 2:
@@ -288,11 +350,12 @@ def cross_fit(
     dealt = [order[first :: min(folds, count)] for first in range(min(folds, count))]
     fitted = run_each(
         fold_of,
-        [(parted, some, divider, tuple(combined), learner) for some in dealt],
+        [(parted, some, divider, tuple(combined), learner, min_support) for some in dealt],
         executor=executor,
+        at_once=at_once,
         progress=progress,
     )
-    return CrossFit(tuple(fitted), whole, parted)
+    return CrossFit(tuple(fitted), whole, parted, min_support)
 
 
 def fold_of(
@@ -301,6 +364,7 @@ def fold_of(
     divider: int,
     combined: Sequence[Pair] = (),
     learner: Learner = "exact",
+    min_support: float = 0.0,
 ) -> Fold:
     """Grow trees without some episodes, and send those down them.
 
@@ -310,6 +374,7 @@ def fold_of(
         divider: Number of intervals of continuous dimensions.
         combined: Pairs of features of which combinations are chosen, without those episodes.
         learner: What grows the trees.
+        min_support: Least share of the pairs of rules that are to be known.
 
     Returns:
         Both.
@@ -320,7 +385,10 @@ def fold_of(
         mined = chosen_again(mined, combined, divider=divider)
         judged = judged.deriving(mined.derived)
     trees = grow_policy_trees(mined, divider=divider, learner=learner)
-    return Fold(trees, tuple(count_nodes(tree, judged) for tree in trees))
+    least = fewest_pairs(min_support, len(mined))
+    if least > 2:  # a pair alone is split no further
+        trees = tuple(cut_back(tree, least, mined) for tree in trees)
+    return Fold(trees, tuple(count_leaves(tree, judged) for tree in trees))
 
 
 def _in_stretches(demonstrations: Demonstrations, count: int) -> Demonstrations:

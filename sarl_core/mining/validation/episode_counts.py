@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.mining.applications import applications, labels_of
 from sarl_core.mining.evidence import EpisodeCounts, Integers
+from sarl_core.mining.growing.structure import tree_levels
 from sarl_core.mining.rule_set import RuleSet, obeying_labels
-from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.tree import LEAF, PolicyTree
 
 
 def episode_of_each(demonstrations: Demonstrations) -> Integers:
@@ -101,6 +102,79 @@ def count_applied(
     return _counted(size, subject, episode, each, right.astype(np.int64), numbers, lengths)
 
 
+class LeafCounts(NamedTuple):
+    """Pairs at the leaves of a tree, K entries: a small part of what is counted at all nodes.
+
+    Attributes:
+        leaf: Node number, (K,).
+        episode: In which episode, 0 to E - 1, (K,).
+        label: Which label, (K,).
+        samples: Pairs of these three, (K,).
+        numbers: What the episodes are called, (E,).
+        lengths: Their steps, (E,).
+    """
+
+    leaf: Integers
+    episode: Integers
+    label: Integers
+    samples: Integers
+    numbers: Integers
+    lengths: Integers
+
+    def of(self, first: int, end: int) -> LeafCounts:
+        """Those of the episodes from one on, counted from 0, and before another."""
+        inside = (self.episode >= first) & (self.episode < end)
+        leaf, episode, label, samples = (column[inside] for column in self[:4])
+        return LeafCounts(
+            leaf, episode - first, label, samples, self.numbers[first:end], self.lengths[first:end]
+        )
+
+    def together(self, tree: PolicyTree, chosen: NDArray[np.bool_]) -> tuple[Integers, Integers]:
+        """Some nodes that do not lie above one another, taken as one.
+
+        Args:
+            tree: Whose leaves they are, with n nodes.
+            chosen: Which, (n,).
+
+        Returns:
+            As `EpisodeCounts.together` of what `count_above` counts.
+        """
+        over = np.where(chosen, np.arange(tree.n_nodes), LEAF)
+        for level in tree_levels(tree.children_left, tree.children_right)[1:]:
+            inherited = over[tree.parent[level]]
+            over[level] = np.where(inherited == LEAF, over[level], inherited)
+        node = over[self.leaf]
+        inside = node != LEAF
+        episode, samples = self.episode[inside], self.samples[inside]
+        right = tree.label[node[inside]] == self.label[inside]
+        some, correct = (
+            np.bincount(episode, weights, minlength=len(self.numbers)).astype(np.int64)
+            for weights in (samples, samples * right)
+        )
+        return some, correct
+
+
+def count_leaves(tree: PolicyTree, demonstrations: Demonstrations) -> LeafCounts:
+    """Send pairs down a tree and count them where they end.
+
+    Args:
+        tree: With n nodes.
+        demonstrations: N pairs, of the same features and actions.
+
+    Returns:
+        The counts.
+    """
+    n_labels, episodes = tree.dimension.n_labels, demonstrations.n_episodes
+    label = tree.dimension.labels_of(demonstrations.action_columns[:, tree.index])
+    leaf = tree.apply(demonstrations.observations)
+    # The pairs of one leaf, episode and label stay together.
+    key = (leaf * episodes + episode_of_each(demonstrations)) * n_labels + label
+    key, samples = np.unique(key, return_counts=True)
+    above, label = np.divmod(key, n_labels)
+    leaf, episode = np.divmod(above, episodes)
+    return LeafCounts(leaf, episode, label, samples, *_episodes_of(demonstrations))
+
+
 def count_nodes(tree: PolicyTree, demonstrations: Demonstrations) -> EpisodeCounts:
     """Send pairs down a tree and count them at every node on their way.
 
@@ -111,40 +185,20 @@ def count_nodes(tree: PolicyTree, demonstrations: Demonstrations) -> EpisodeCoun
     Returns:
         The counts, by node number.
     """
-    n_labels, episodes = tree.dimension.n_labels, demonstrations.n_episodes
-    label = tree.dimension.labels_of(demonstrations.action_columns[:, tree.index])
-    leaf = tree.apply(demonstrations.observations)
-    # The pairs of one leaf, episode and label go up together.
-    key = (leaf * episodes + episode_of_each(demonstrations)) * n_labels + label
-    key, samples = np.unique(key, return_counts=True)
-    above, label = np.divmod(key, n_labels)
-    leaf, episode = np.divmod(above, episodes)
-    return count_above(tree, leaf, episode, label, samples, *_episodes_of(demonstrations))
+    return count_above(tree, count_leaves(tree, demonstrations))
 
 
-def count_above(
-    tree: PolicyTree,
-    leaf: Integers,
-    episode: Integers,
-    label: Integers,
-    samples: Integers,
-    numbers: Integers,
-    lengths: Integers,
-) -> EpisodeCounts:
+def count_above(tree: PolicyTree, counts: LeafCounts) -> EpisodeCounts:
     """What was counted at leaves, at every node above them.
 
     Args:
         tree: With n nodes.
-        leaf: Node number, (K,).
-        episode: In which episode, 0 to E - 1, (K,).
-        label: Which label, (K,).
-        samples: Pairs of these three, (K,).
-        numbers: What the episodes are called, (E,).
-        lengths: Their steps, (E,).
+        counts: At its leaves.
 
     Returns:
         The counts, by node number.
     """
+    leaf, episode, label, samples, numbers, lengths = counts
     node = leaf
     parts: list[tuple[Integers, ...]] = []
     while len(node):

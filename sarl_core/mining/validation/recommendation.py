@@ -8,14 +8,14 @@ had with few: the fewest rules are recommended that lose next to nothing against
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sarl_core.mining.evidence import FEWEST_EPISODES
+from sarl_core.mining.evidence import FEWEST_EPISODES, EpisodeSums
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.thresholds.landscape import (
     EpisodePlane,
@@ -68,7 +68,7 @@ def enough_episodes(fit: CrossFit) -> bool:
 
 def episode_count(fit: CrossFit) -> int:
     """How many episodes judge; of stretches of one, that one."""
-    return sum(len(fold.counts[0].numbers) for fold in fit.folds) if fit.whole_episodes else 1
+    return sum(len(fold.leaves[0].numbers) for fold in fit.folds) if fit.whole_episodes else 1
 
 
 def recommended(
@@ -81,7 +81,8 @@ def recommended(
 ) -> Recommendation | None:
     """The fewest rules that are nearly as right elsewhere as any at the steps of the sliders.
 
-    Exact at every pair of steps: the trees without each fold know their rules at all of them.
+    Exact at every pair of steps from `fit.least_support` on: the trees without each fold know
+    their rules at all of these.
 
     Args:
         trees: Grown from all episodes, one an action dimension.
@@ -97,22 +98,26 @@ def recommended(
     if not enough_episodes(fit):
         return None
     place = 0 if dimension is None else 1 + dimension
+    supports = tuple(support for support in SUPPORT_STEPS if support >= fit.least_support)
     planes = [
-        episode_sums(
-            fold.trees,
-            SUPPORT_STEPS,
-            CONFIDENCE_STEPS,
-            fold.counts,
-            lift_min=lift_min,
-            max_depth=max_depth,
-        )[place]
+        _added(
+            episode_sums(
+                fold.trees,
+                supports,
+                CONFIDENCE_STEPS,
+                counts,
+                lift_min=lift_min,
+                max_depth=max_depth,
+            )[place]
+            for counts in fold.counts()
+        )
         for fold in fit.folds
     ]
     landscape = threshold_landscape(
-        trees, SUPPORT_STEPS, CONFIDENCE_STEPS, lift_min=lift_min, max_depth=max_depth
+        trees, supports, CONFIDENCE_STEPS, lift_min=lift_min, max_depth=max_depth
     )
     rules = (landscape if dimension is None else landscape.dimensions[dimension]).rule_count
-    episodes = [len(fold.counts[0].numbers) for fold in fit.folds]
+    episodes = [len(fold.leaves[0].numbers) for fold in fit.folds]
     together = _elsewhere(planes, episodes)
     chosen = _choice(rules, together)
     if chosen is None:
@@ -120,7 +125,7 @@ def recommended(
     best = together.fidelity[together.enough].max()
     return Recommendation(
         thresholds=Thresholds(
-            SUPPORT_STEPS[chosen[0]], CONFIDENCE_STEPS[chosen[1]], lift_min, max_depth
+            supports[chosen[0]], CONFIDENCE_STEPS[chosen[1]], lift_min, max_depth
         ),
         rules=int(rules[chosen]),
         coverage=float(together.coverage[chosen]),
@@ -146,6 +151,13 @@ class _Elsewhere(NamedTuple):
     def enough(self) -> NDArray[np.bool_]:
         """Where rules apply often enough to be compared."""
         return self.coverage >= COVERAGE
+
+
+def _added(planes: Iterable[EpisodePlane]) -> EpisodePlane:
+    """What is added up over the episodes of several."""
+    fidelity, coverage = zip(*planes, strict=True)
+    sums = (np.sum(columns, axis=0) for columns in zip(*fidelity, strict=True))
+    return EpisodePlane(EpisodeSums(*sums), np.sum(coverage, axis=0))
 
 
 def _elsewhere(planes: Sequence[EpisodePlane], episodes: Sequence[int]) -> _Elsewhere:

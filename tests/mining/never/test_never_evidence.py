@@ -73,8 +73,8 @@ def test_every_episode_is_judged_by_rules_that_forbid_mined_without_it(lander_li
     found = fit.of(mine)
     assert sorted(found.numbers) == sorted(np.unique(lander_like.episodes))
     for number, covered, correct in zip(found.numbers, found.covered, found.correct, strict=True):
-        fold = next(one for one in fit.folds if number in one.counts[0].numbers)
-        others = np.setdiff1d(lander_like.episodes, fold.counts[0].numbers)
+        fold = next(one for one in fit.folds if number in one.leaves[0].numbers)
+        others = np.setdiff1d(lander_like.episodes, fold.leaves[0].numbers)
         leeway = leeway_of(mine(lander_like.select(others)), lander_like.select([number]))
         assert covered == round(leeway.coverage * 100)
         assert correct == round(leeway.fidelity * covered)
