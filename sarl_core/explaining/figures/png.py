@@ -6,23 +6,27 @@ import asyncio
 import io
 import logging
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from sarl_core.errors import WorkError, quoted
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
+Result = TypeVar("Result")
 Draw = Callable[["go.Figure"], bytes]
 """Gives a figure, at the size its layout says, as a PNG."""
 
 _SCALE = 2  # pixels for one, so that text is sharp
 _COLOURS = 256
 _WHAT = "the picture could not be drawn"
+# Seconds for a picture, which takes about one, and ten where the browser is to start on a busy
+# machine: now and then one starts and never answers.
+_PATIENCE = 60.0
 _BROWSER = "BROWSER_PATH"  # environment variable that Kaleido goes by
 
 
@@ -63,12 +67,12 @@ class _Session:
 
     def draw(self, figure: go.Figure) -> bytes:
         try:
-            return self.runner.run(self._drawn(figure))
+            return self._within_patience(self._drawn(figure))
         except Exception as error:  # whatever Kaleido or the browser has to complain about
             first = error
         self._end()
         try:  # once more: a browser may be gone when hours lie between two figures
-            return self.runner.run(self._drawn(figure))
+            return self._within_patience(self._drawn(figure))
         except Exception:
             self._end()
             raise without_browser(first, _WHAT, "leave the pictures out") from first
@@ -79,7 +83,8 @@ class _Session:
         _silence_browser()
         if self.browser is None:
             # Formulas would make the browser ask a server for MathJax; there are none.
-            self.browser = await kaleido.Kaleido(n=1, mathjax=False).__aenter__()
+            self.browser = kaleido.Kaleido(n=1, mathjax=False)
+            await self.browser.__aenter__()
         layout = figure.layout
         size = {"width": layout.width or 700, "height": layout.height or 500}
         picture: bytes = await self.browser.calc_fig(
@@ -91,7 +96,10 @@ class _Session:
         browser, self.browser = self.browser, None
         if browser is not None:
             with suppress(Exception):  # one that is gone needs no farewell
-                self.runner.run(browser.__aexit__(None, None, None))
+                self._within_patience(browser.__aexit__(None, None, None))
+
+    def _within_patience(self, work: Coroutine[Any, Any, Result]) -> Result:
+        return self.runner.run(asyncio.wait_for(work, _PATIENCE))
 
     def close(self) -> None:
         self._end()
