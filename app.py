@@ -19,7 +19,9 @@ import streamlit as st
 
 from sarl_core.errors import InputError
 from sarl_core.files import temporary_folder
+from sarl_core.memory import give_back_large_arrays
 from sarl_dashboard import providers
+from sarl_dashboard.serving.lean_start import lean_start
 from sarl_dashboard.serving.log_lines import write_json_lines
 from sarl_dashboard.serving.routes import routes
 
@@ -29,6 +31,8 @@ gc.freeze()
 gc.disable()
 
 write_json_lines()
+lean_start()
+give_back_large_arrays()
 try:
     providers.check()
 except InputError as error:

@@ -27,6 +27,7 @@ from sarl_dashboard.components.sidebar import (
 from sarl_dashboard.session import settle
 from sarl_dashboard.state import data_words, in_force, library
 from sarl_dashboard.state.data import settle_choices
+from sarl_dashboard.state.thresholds import take_over_moved
 from sarl_dashboard.state.url import (
     absurd_parameters,
     begin_run,
@@ -97,6 +98,7 @@ aliases = [
     st.Page(lambda: None, title=title, url_path=path, visibility="hidden")
     for path, title in ALIASES.items()
 ]
+take_over_moved()  # before it is said what they are
 bring_along(threshold_parameters())
 admitted = is_admitted()
 page = st.navigation(

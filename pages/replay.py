@@ -25,15 +25,16 @@ with form:
     choices = settings()
 with result:
     order = open_with(choices)
+at_work = REPLAY.at_work
 jump = arrived()
 played = latest()
-first = played is None and REPLAY.at_work
+first = played is None and at_work
 # How far the work is stands where the picture will be, or below the form that asked for it. It is
 # drawn before all that follows: a press on Run is answered with it.
 with result if first else form:
     if first:
         st.caption("The first replay begins by itself. In the form below you choose another one.")
-    replay_bar(order, played)
+    replay_bar(order, played, missed=at_work and jump is None)
 if played is None:
     if order is not None and not REPLAY.at_work:
         st.info(

@@ -26,14 +26,12 @@ from sarl_dashboard.views.thresholds.maps import (
     show_maps,
     show_surfaces,
 )
-from sarl_dashboard.views.thresholds.moves import take_over
 from sarl_dashboard.views.thresholds.trade_offs import show_trade_offs
 
 st.title("Thresholds")
 demonstrations = require_demonstrations()
 trees = grown_trees(demonstrations, chosen_divider())
 compact = chosen_compact(demonstrations)
-take_over()
 forbids = chosen_mode() != DEMAND
 st.caption(
     "A rule must apply to at least a certain share of the states (support), and the expert must "

@@ -118,6 +118,24 @@ assert gc.isenabled()
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 
 
+@pytest.mark.parametrize(("begin", "looks"), [("import streamlit", 1), ("import app", 0)])
+def test_a_start_looks_neither_at_other_packages_nor_at_all_modules(begin: str, looks: int) -> None:
+    code = f"""
+{begin}
+import importlib.metadata
+from streamlit.components.v2.component_manager import BidiComponentManager
+looks = []
+importlib.metadata.distributions = lambda **_: looks.append(1) or []
+BidiComponentManager().discover_and_register_components()
+import inspect
+inspect.stack = lambda: looks.append(2) or [(None, "page.py")]
+import streamlit as st
+st.empty()
+assert len(looks) == 2 * {looks}, looks
+"""
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
 @pytest.mark.parametrize("package", sorted(LEARNERS))
 def test_a_learner_that_is_not_installed_is_told_with_what_to_do(package: str) -> None:
     calls = [

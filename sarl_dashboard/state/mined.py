@@ -122,7 +122,7 @@ def _rules_of_file(mined: MinedData, thresholds: Thresholds) -> RuleSet:
     return mined.at(thresholds)
 
 
-@cached()
+@cached(show_spinner="Mining the rules …")
 def _mined_rules(trees: Trees, thresholds: Thresholds, parts: Parts | None) -> RuleSet:
     rule_set = mine_at(trees, thresholds)
     if parts is None or parts.mined.whole.digest != rule_set.source.digest:
@@ -162,7 +162,7 @@ def fidelity_at(thresholds: Thresholds) -> float:
     return mined_leeway(rule_set, demonstrations).fidelity
 
 
-@cached()
+@cached(show_spinner="Counting what the rules forbid …")
 def mined_leeway(rule_set: RuleSet, demonstrations: Demonstrations) -> Leeway:
     """What rules that forbid, alone or behind others, say of what they were mined from."""
     return leeway_of(rule_set, demonstrations)
@@ -217,7 +217,7 @@ def mined_landscape(
     )
 
 
-@cached()
+@cached(show_spinner="Counting what the rules forbid …")
 def mined_never_landscape(
     trees: Trees, supports: tuple[float, ...], epsilons: tuple[float, ...], *, depth: int | None
 ) -> NeverLandscape:

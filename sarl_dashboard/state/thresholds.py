@@ -17,7 +17,8 @@ from sarl_dashboard.state.url import note_unusable, set_url_choice, url_choice
 THRESHOLDS = "thresholds"
 """In an address: the rules are those at the thresholds."""
 MIN_DIVIDER, MAX_DIVIDER = 2, 16
-LEARNERS: tuple[LearnerChoice, ...] = ("auto", "exact", "histogram")
+AUTOMATIC: LearnerChoice = "auto"
+LEARNERS: tuple[LearnerChoice, ...] = (AUTOMATIC, "exact", "histogram")
 DEMAND, FORBID, BOTH = "demand", "forbid", "both"
 MAX_LIFT = 20.0
 MAX_DEPTH = 64  # 0 is no limit
@@ -133,16 +134,29 @@ def keep_thresholds() -> None:
     _put({name: value for name, (value, _) in threshold_values().items()})
 
 
-def choose_thresholds(thresholds: Thresholds) -> None:
-    """Put thresholds of rules that demand in force; for callbacks."""
-    _put(
-        {
-            "support": thresholds.support,
-            "confidence": thresholds.confidence,
-            "lift": thresholds.lift,
-            "depth": thresholds.max_depth or 0,
-        }
-    )
+def move_thresholds(values: Mapping[str, float]) -> None:
+    """Put thresholds in force, by their names in the URL, in the run that a callback asks for next.
+
+    `take_over_moved` writes them where the sliders find them. What the callback wrote there itself
+    would not reach the browser; and where a timer of the page has asked for a run meanwhile, with
+    the values that sliders had before, those would take its place.
+    """
+    st.session_state["_moved"] = dict(values)
+
+
+def take_over_moved() -> None:
+    """Hand moved thresholds to the sliders, before these are drawn."""
+    _put(st.session_state.pop("_moved", {}))
+
+
+def named_thresholds(thresholds: Thresholds) -> dict[str, float]:
+    """Thresholds of rules that demand, by their names in the URL."""
+    return {
+        "support": thresholds.support,
+        "confidence": thresholds.confidence,
+        "lift": thresholds.lift,
+        "depth": thresholds.max_depth or 0,
+    }
 
 
 def _put(values: Mapping[str, float]) -> None:
@@ -166,10 +180,10 @@ def choose_divider(divider: int) -> None:
 
 def chosen_learner() -> LearnerChoice:
     """What grows the trees (URL: learner)."""
-    chosen = url_choice("learner", LEARNERS, LEARNERS[0])
+    chosen = url_choice("learner", LEARNERS, AUTOMATIC)
     return next(one for one in LEARNERS if one == chosen)
 
 
 def choose_learner(learner: LearnerChoice) -> None:
     """Choose a learner; for callbacks."""
-    set_url_choice("learner", learner, LEARNERS[0])
+    set_url_choice("learner", learner, AUTOMATIC)

@@ -18,15 +18,19 @@ from sarl_dashboard.jobs import cross_fitting
 from sarl_dashboard.jobs.job import Job
 from sarl_dashboard.state import library as state
 from tests.app.mined_file import MinedFiles, mined_files
+from tests.app.screens import ROUTER
 
 
 @pytest.fixture(scope="session", autouse=True)
 def one_server() -> Iterator[None]:
     """What a server does once, Streamlit's tests do at each visit, and more slowly than the rest.
 
-    It reads what is said of all installed packages, for components, and compiles the pages.
+    It reads what is said of all installed packages, for components, and compiles the pages. The
+    pages' folder stays on the import path (as app.py has it): an import in another thread finds
+    nothing in the moment in which it is taken away.
     """
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "path", [*sys.path, str(ROUTER.parent)])
         scan = cache(manifest_scanner.scan_component_manifests)
         patch.setattr(manifest_scanner, "scan_component_manifests", scan)
         patch.setattr(app_test, "ScriptCache", cache(app_test.ScriptCache))

@@ -81,6 +81,29 @@ def test_what_went_wrong_is_said_with_a_way_to_try_again(monkeypatch: pytest.Mon
     assert app.button(key="run_growing").label == "Grow the tree"
 
 
+def test_a_choice_that_asks_for_a_tree_nobody_wants_is_taken_back(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(growing, "grow_structures", slow)
+    choices = {"learner": "histogram", "holdout": "0.2", "combine": "every"}
+    app = open_page("rules", data="cartpole", **choices)
+    labels = {
+        "learner": "Choose the learner automatically",
+        "holdout": "Hold out no episodes",
+        "combine": "Combine no features",
+    }
+    assert not [button for button in app.button if button.label in labels.values()]
+    for name, label in labels.items():
+        app.button(key="cancel_growing").click().run()
+        assert not app.exception
+        (button,) = (button for button in app.button if button.label == label)
+        button.click().run()
+        assert name not in app.query_params
+        assert work_of(app).running  # the tree that is asked for now
+    app.button(key="cancel_growing").click().run()
+    assert not [button for button in app.button if button.label in labels.values()]
+
+
 def test_of_many_states_nobody_waits_for_all_rules_to_compare_with() -> None:
     app = open_page("difference", data="cartpole", support="0.02")
     until = time.monotonic() + WAIT

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from streamlit.testing.v1 import AppTest
 
 from sarl_core import load_demonstrations, mine_rules, save_demonstrations
 from sarl_core.mining.rule_set import rules_to_json
+from sarl_dashboard.jobs import replays
 from tests.app.screens import (
     errors,
     finished,
@@ -37,6 +39,22 @@ def test_the_page_opens_with_the_novice_under_the_rules_in_force() -> None:
     assert "rules (at the thresholds)" in texts(app)
     assert "Return with rules" in metrics(app)
     assert not app.button(key="run_replay").disabled  # another one can be had
+
+
+def test_a_replay_that_ends_while_the_page_is_drawn_is_shown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    latest = replays.latest
+
+    def looked_up_too_soon() -> replays.Played | None:
+        before, job = latest(), replays.REPLAY.job
+        while job is not None and job.running:
+            time.sleep(0.01)
+        return before
+
+    monkeypatch.setattr(replays, "latest", looked_up_too_soon)
+    app = open_page("replay", data="cartpole")
+    assert "Return with rules" in metrics(app)
 
 
 def test_another_task_is_not_left_with_the_picture_of_the_one_before() -> None:

@@ -17,6 +17,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from sarl_core.serving.limits import VARIABLE, ServerLimits
+from tests.browser.walking import RUNS
 
 ROOT = Path(__file__).parents[2]
 CHROMIUM = "/usr/bin/chromium"
@@ -102,6 +103,7 @@ def windows(chromium: Browser, address: str) -> Iterator[BrowserContext]:
     context = chromium.new_context(
         base_url=address, viewport={"width": 1440, "height": 900}, accept_downloads=True
     )
+    context.add_init_script(RUNS)
     yield context
     context.close()
 

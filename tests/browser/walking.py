@@ -5,6 +5,7 @@ from __future__ import annotations
 from urllib.parse import parse_qs, urlsplit
 
 from playwright.sync_api import Locator, Page, expect
+from streamlit.proto.BackMsg_pb2 import BackMsg
 
 PATIENCE = 60_000
 
@@ -16,16 +17,38 @@ def visit(screen: Page, path: str, title: str) -> None:
     settle(screen)
 
 
-# Whether the script has ended, all parts of the page are there (Streamlit fetches the code of
-# some of them, of charts for one, when it first needs it), and the page has stood still.
+# When the page last asked for a run, and when a run last ended. The first byte of what it sends
+# tells the field of the message that is set.
+RUNS = """
+const send = WebSocket.prototype.send;
+WebSocket.prototype.send = function (message) {
+  const bytes = message.buffer ? new Uint8Array(message.buffer, message.byteOffset, 1)
+    : message instanceof ArrayBuffer ? new Uint8Array(message, 0, 1) : [0];
+  if (bytes[0] >> 3 === RERUN) window.lastAsked = performance.now();
+  return send.call(this, message);
+};
+new MutationObserver(() => {
+  const state = document.querySelector('[data-test-script-state]')
+    ?.getAttribute('data-test-script-state');
+  if (state === 'notRunning' && window.lastState !== state) window.lastEnded = performance.now();
+  window.lastState = state;
+}).observe(document, {subtree: true, attributeFilter: ['data-test-script-state']});
+""".replace("RERUN", str(BackMsg.DESCRIPTOR.fields_by_name["rerun_script"].number))
+
+
+# Whether the run that was last asked for has ended, all parts of the page are there (Streamlit
+# fetches the code of some of them, of charts for one, when it first needs it), and the page has
+# stood still. A run may end so soon that the page never says that it runs.
 STILL = """
-quiet => {
+([quiet, since]) => {
   if (window.lastChange === undefined) {
     window.lastChange = performance.now();
     new MutationObserver(() => { window.lastChange = performance.now(); }).observe(
       document.body, {subtree: true, childList: true, characterData: true});
   }
-  return document.querySelector('[data-test-script-state]')
+  const waits = window.lastAsked !== undefined && !(window.lastEnded > window.lastAsked);
+  return (!waits || Date.now() - since > 5000)
+    && document.querySelector('[data-test-script-state]')
       ?.getAttribute('data-test-script-state') === 'notRunning'
     && document.querySelector('[data-testid=stSkeleton]') === null
     && performance.now() - window.lastChange > quiet;
@@ -45,7 +68,7 @@ def settle(screen: Page) -> None:
     # A table that was just drawn says a little later what is selected in it, and asks for a run.
     for _ in range(2):
         screen.evaluate(ANSWERED)
-        screen.wait_for_function(STILL, arg=250)
+        screen.wait_for_function(STILL, arg=[250, screen.evaluate("Date.now()")])
 
 
 def metric(screen: Page, label: str) -> str:

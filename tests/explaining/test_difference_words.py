@@ -94,6 +94,11 @@ def test_a_change_and_a_conflict_in_words():
     assert "Coverage rises from 39.9 % to 40.0 %." in edits_change_text(
         change(many, more), many, more, states="state"
     )
+    many = replace(after, labels=np.r_[np.ones((39_999, 1), int), [[-1]] * 60_001])
+    more = replace(many, labels=np.r_[np.ones((40_000, 1), int), [[-1]] * 60_000])
+    assert "Coverage rises by less than 0.01 points, from 40.00 %." in edits_change_text(
+        change(many, more), many, more, states="state"
+    )
     assert conflict_text(after.conflicts[0], after.rule_set, states="state") == (
         "R2 (right) takes 2 states from R1 (left); the expert did as R2 says in 0 of them, as R1 "
         "says in 2."

@@ -84,7 +84,7 @@ def edits_change_text(effect: EditEffect, before: Verdicts, after: Verdicts, *, 
         parts.append(f"by action: {', '.join(names)}")
     text += f" ({'; '.join(parts)})." if parts else "."
     moved = [
-        f"{name} {verb} from {' to '.join(_apart(old, new))}"
+        f"{name} {verb} {_from_to(old, new)}"
         for name, old, new in (
             ("Coverage", before.coverage, after.coverage),
             ("fidelity", before.fidelity, after.fidelity),
@@ -99,13 +99,13 @@ def edits_change_text(effect: EditEffect, before: Verdicts, after: Verdicts, *, 
     return text
 
 
-def _apart(old: float, new: float) -> tuple[str, str]:
-    """Two shares that differ, with as many digits as show it, where that is few."""
-    texts = share_text(old), share_text(new)
-    for decimals in (1, 2):
-        if texts[0] == texts[1]:
-            texts = share_text(old, decimals=decimals), share_text(new, decimals=decimals)
-    return texts
+def _from_to(old: float, new: float) -> str:
+    """From where to where a share went that has changed, with as many digits as show it."""
+    for decimals in (None, 1, 2):
+        before, after = share_text(old, decimals=decimals), share_text(new, decimals=decimals)
+        if before != after:
+            return f"from {before} to {after}"
+    return f"by less than 0.01 points, from {before}"
 
 
 def conflict_text(conflict: Conflict, rule_set: RuleSet, *, states: str) -> str:

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import streamlit as st
 
+from sarl_core.demonstrations.dataset import Demonstrations
+from sarl_core.mining.growing.growth import learner_for
 from sarl_dashboard.components.run_bar import Offer, run_bar, watched
 from sarl_dashboard.jobs import growing
 from sarl_dashboard.session import end_page
-from sarl_dashboard.state import rule_base
+from sarl_dashboard.state import combining, hold_out, rule_base
 from sarl_dashboard.state.data import chosen_demonstrations
-from sarl_dashboard.state.thresholds import chosen_divider
+from sarl_dashboard.state.mined import learner_of
+from sarl_dashboard.state.thresholds import (
+    AUTOMATIC,
+    choose_learner,
+    chosen_divider,
+)
 
 
 def require_trees(title: str) -> None:
@@ -42,4 +50,23 @@ def require_trees(title: str) -> None:
         label="Grow the tree",
     )
     watched(growing.PLACE, lambda _: run_bar(growing.PLACE, offer))
+    if lies_waiting:
+        _show_other_ways(demonstrations)
     end_page()
+
+
+def _show_other_ways(demonstrations: Demonstrations) -> None:
+    """What takes back a choice that asks for this tree: its own page needs the tree, too."""
+    ways: list[tuple[str, Callable[[], None]]] = []
+    if learner_of(demonstrations) != learner_for(AUTOMATIC, len(demonstrations)):
+        ways.append(("Choose the learner automatically", partial(choose_learner, AUTOMATIC)))
+    if hold_out.chosen().share:
+        ways.append(("Hold out no episodes", partial(hold_out.choose_share, hold_out.NOTHING)))
+    choice = combining.chosen()
+    if choice.on:
+        ways.append(("Combine no features", partial(combining.choose, choice._replace(on=False))))
+    if ways:
+        with st.container(horizontal=True, vertical_alignment="center"):
+            st.caption("Or take back a choice that asks for another tree:", width="content")
+            for label, take_back in ways:
+                st.button(label, icon=":material/undo:", on_click=take_back)

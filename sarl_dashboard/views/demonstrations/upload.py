@@ -220,7 +220,8 @@ def _show_reading() -> bool:
     job = PLACE.job
     if job is None:
         return False
-    if not (job.running or job.cancelled):
+    running = job.running
+    if not (running or job.cancelled):
         if _finish(job):
             st.rerun()
         return False
@@ -232,7 +233,7 @@ def _show_reading() -> bool:
         cancelled="Cancelled. Nothing has changed: what was chosen before still is.",
         label="Read",
     )
-    watched(PLACE, lambda _: run_bar(PLACE, offer))
+    watched(PLACE, lambda _: run_bar(PLACE, offer), missed=running)
     return True
 
 

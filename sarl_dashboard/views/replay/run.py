@@ -63,12 +63,13 @@ def open_with(settings: ReplaySettings) -> ReplayOrder | None:
     return order
 
 
-def replay_bar(order: ReplayOrder | None, played: Played | None) -> None:
+def replay_bar(order: ReplayOrder | None, played: Played | None, *, missed: bool) -> None:
     """The button, or how far the work is.
 
     Args:
         order: What the settings ask for; None if it cannot be had.
         played: On screen; None where nothing is yet.
+        missed: As of `watched`.
     """
     offer = None
     if order is not None:
@@ -83,7 +84,7 @@ def replay_bar(order: ReplayOrder | None, played: Played | None) -> None:
         )
         if st.session_state.pop("_run", False):
             REPLAY.begin(offer.start)
-    watched(REPLAY, lambda _: run_bar(REPLAY, offer), seconds=0.5)
+    watched(REPLAY, lambda _: run_bar(REPLAY, offer), seconds=0.5, missed=missed)
     changed = played is not None and (order is None or order.key != played.order.key)
     # Below the buttons: what goes away above one that is being pressed moves it from the pointer.
     if changed and not REPLAY.at_work:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import streamlit as st
-
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.explaining.words.what_if import node_in
 from sarl_core.mining.rule_set import RuleSet
@@ -69,8 +67,7 @@ def rules_in_force(demonstrations: Demonstrations) -> InForce:
         )
     else:
         trees = grown_trees(demonstrations, chosen_divider())
-        with st.spinner("Mining the rules …"):
-            rule_set = mined_rules(trees, chosen_thresholds(), data_parts())
+        rule_set = mined_rules(trees, chosen_thresholds(), data_parts())
         of = InForce(demonstrations, trees, chosen_thresholds(), None, rule_set)
     if not in_force.is_edited() and (compact is not None or rule_base.at_thresholds()):
         return of

@@ -47,6 +47,7 @@ from sarl_dashboard.state.thresholds import (
     from_least,
     least_support,
     settled,
+    take_over_moved,
 )
 from sarl_dashboard.state.url import stay_beside
 from sarl_dashboard.views.thresholds.display import Display
@@ -55,7 +56,6 @@ from sarl_dashboard.views.thresholds.moves import (
     follow,
     jump,
     leave_compact,
-    take_over,
     use,
     use_compact,
     use_mode,
@@ -104,7 +104,7 @@ def show_controls(
         landscape: That of the maps.
         table: Where the table of rules goes; None where it is not looked at.
     """
-    take_over()
+    take_over_moved()
     thresholds = chosen_thresholds()
     both = thresholds.never is not None and thresholds.demands
     # What the sliders are moved for is sent first, and drawn before the rest comes: a browser that
@@ -112,9 +112,10 @@ def show_controls(
     sliders = st.container(key="sliders")
     point = display.point(thresholds)
     everything = display.dimension is None
+    judged = cross_fitting.judged(thresholds) if everything else None
     show_numbers(
         point,
-        cross_fitting.judged(thresholds) if everything else None,
+        judged,
         display.trees[0] if display.compact is None else None,
     )
     upwards = thresholds.confidence if thresholds.demands else thresholds.never or 0.0
@@ -129,7 +130,7 @@ def show_controls(
     if both and display.compact is None and demonstrations is not None:
         say_of_sample("Coverage, fidelity and freedom", demonstrations)
     if everything:
-        elsewhere_notice(thresholds, float(point.fidelity[0, 0]))
+        elsewhere_notice(thresholds, float(point.fidelity[0, 0]), missed=judged is None)
     if thresholds.never is None:
         show_recommendation(display, thresholds)
     if table is not None:

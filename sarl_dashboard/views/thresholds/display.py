@@ -248,7 +248,7 @@ def more() -> None:
             help=with_words(
                 "What grows the decision tree. Exact tries every border between two values; "
                 f"histogram those between {BINS:,} bins of a feature, for many states. Automatic: "
-                f"exact up to {EXACT_UP_TO:,} states, then histogram where it is installed. "
+                f"exact up to {EXACT_UP_TO:,} states, then histogram. "
                 "Counts are of all states with either."
             ),
         )

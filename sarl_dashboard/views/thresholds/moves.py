@@ -11,10 +11,11 @@ from sarl_dashboard.state import rule_base
 from sarl_dashboard.state.thresholds import (
     FORBID,
     choose_mode,
-    choose_thresholds,
     chosen_limits,
     chosen_mode,
     least_support,
+    move_thresholds,
+    named_thresholds,
 )
 from sarl_dashboard.views.thresholds.display import SURFACES, TRADE_OFFS
 
@@ -29,21 +30,11 @@ def follow() -> None:
 
 
 def move(**thresholds: float) -> None:
-    """Put thresholds in force, by their names in the URL.
-
-    `take_over` writes them where the sliders find them: what a callback in a fragment writes to a
-    slider does not reach the browser when it asks for another run.
-    """
-    st.session_state["_moved"] = thresholds
+    """Put thresholds in force, by their names in the URL."""
+    move_thresholds(thresholds)
     if not rule_base.at_thresholds():
         leave_compact()
     follow()
-
-
-def take_over() -> None:
-    """Hand moved thresholds to the sliders, before these are drawn."""
-    for name, value in st.session_state.pop("_moved", {}).items():
-        st.session_state[name] = value
 
 
 def jump(name: str, value: float) -> None:
@@ -53,7 +44,7 @@ def jump(name: str, value: float) -> None:
 
 def use(setting: Thresholds) -> None:
     """Put a named setting in force."""
-    choose_thresholds(setting)
+    move_thresholds(named_thresholds(setting))
     rule_base.choose()
     st.rerun()  # lift and depth, which it resets, are part of the maps
 

@@ -73,7 +73,7 @@ def _neighbourhood(rule_set: RuleSet, projection: Projection, outside: Outside) 
     return Neighbourhood(Shield(rule_set, projection=projection, outside=outside))
 
 
-@cached()
+@cached(show_spinner="Looking where the values lie …")
 def _spans(demonstrations: Demonstrations) -> tuple[tuple[Span, ...], NDArray[np.float64]]:
     observations, features = demonstrations.raw_observations, demonstrations.observed
     spans = list(feature_spans(observations))
