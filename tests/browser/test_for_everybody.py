@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, Page, expect
 from sarl_core import audit, load_demonstrations, make_report, mine_rules
 from sarl_core.explaining.exports.audit import audit_html
 from sarl_core.explaining.html.rule_matrix import matrix_document, rule_matrix
-from tests.browser.walking import no_trace, settle, visit
+from tests.browser.walking import no_trace, rest, settle, visit
 
 DATA = Path(__file__).parents[2] / "data" / "demonstrations"
 PATIENCE = 240_000  # milliseconds; the processes that run episodes may have to start first
@@ -105,6 +105,7 @@ def test_everybody_can_use_every_page_as_it_opens(screen: Page) -> None:
     found = {}
     for path, title in PAGES.items():
         visit(screen, f"/{path}{'&' if '?' in path else '?'}data=cartpole", title)
+        rest(screen, patience=PATIENCE)
         found |= held_in_both_themes(screen)
         no_trace(screen)
     assert not found, json.dumps(found, indent=1)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from urllib.parse import parse_qs, urlsplit
 
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import Locator, Page, TimeoutError, expect
 from streamlit.proto.BackMsg_pb2 import BackMsg
 
 PATIENCE = 60_000
@@ -43,8 +44,11 @@ STILL = """
 ([quiet, since]) => {
   if (window.lastChange === undefined) {
     window.lastChange = performance.now();
-    new MutationObserver(() => { window.lastChange = performance.now(); }).observe(
-      document.body, {subtree: true, childList: true, characterData: true});
+    window.changed = [];
+    new MutationObserver(changes => {
+      window.lastChange = performance.now();
+      window.changed = [...window.changed, ...changes].slice(-20);
+    }).observe(document.body, {subtree: true, childList: true, characterData: true});
   }
   const waits = window.lastAsked !== undefined && !(window.lastEnded > window.lastAsked);
   return (!waits || Date.now() - since > 5000)
@@ -56,6 +60,29 @@ STILL = """
 """
 
 
+# Why the page does not come to rest.
+RESTLESS = """
+() => {
+  const state = document.querySelector('[data-test-script-state]')
+    ?.getAttribute('data-test-script-state');
+  const named = node => node.nodeName + (node.dataset?.testid ? ` ${node.dataset.testid}` : '')
+    + ` "${(node.textContent ?? '').slice(0, 60)}"`;
+  const within = node => (node.nodeType === 1 ? node : node.parentElement)
+    ?.closest('[data-testid]')?.dataset.testid;
+  const since = time => time === undefined ? 'never' : Math.round(performance.now() - time);
+  return [
+    `state ${state}; milliseconds since a run was asked for ${since(window.lastAsked)}, since one `
+    + `ended ${since(window.lastEnded)}, since the last change ${since(window.lastChange)}`,
+    ...[...document.querySelectorAll('[data-testid=stSkeleton]')].map(
+      node => `a skeleton in ${within(node.parentElement)}`),
+    ...(window.changed ?? []).map(change => `${change.type} in ${within(change.target)}: `
+      + [...change.addedNodes].map(node => `+ ${named(node)}`).join(' ')
+      + [...change.removedNodes].map(node => `- ${named(node)}`).join(' ')),
+  ].join('\\n');
+}
+"""
+
+
 # Whatever the page has sent by now is with the server when that has answered two questions.
 ANSWERED = """
 async () => { for (let i = 0; i < 2; i++) await fetch('/_stcore/health').catch(() => null) }
@@ -63,12 +90,34 @@ async () => { for (let i = 0; i < 2; i++) await fetch('/_stcore/health').catch((
 
 
 def settle(screen: Page) -> None:
-    """Wait until the script has run to its end, and what it sent is drawn."""
+    """Wait until the script has run to its end, and what it sent is drawn.
+
+    A page that does not come to rest fails nothing here, for what is looked at next says whether
+    it is there; why it did not is told in the summary of the tests.
+    """
     screen.wait_for_timeout(150)  # until a press is sent
     # A table that was just drawn says a little later what is selected in it, and asks for a run.
     for _ in range(2):
         screen.evaluate(ANSWERED)
-        screen.wait_for_function(STILL, arg=[250, screen.evaluate("Date.now()")])
+        try:
+            rest(screen)
+        except TimeoutError:
+            with warnings.catch_warnings():
+                warnings.simplefilter("default")
+                text = f"no rest on {screen.url}\n{screen.evaluate(RESTLESS)}"
+                warnings.warn(text, stacklevel=2)
+
+
+def rest(screen: Page, *, patience: float = PATIENCE) -> None:
+    """Wait until a page stands still, or raise.
+
+    Args:
+        screen: The page.
+        patience: Milliseconds.
+    """
+    since = screen.evaluate("Date.now()")
+    # Not with each frame that is drawn, as by default: a browser that draws none would never look.
+    screen.wait_for_function(STILL, arg=[250, since], polling=50, timeout=patience)
 
 
 def metric(screen: Page, label: str) -> str:
