@@ -157,7 +157,6 @@ def completed(
     calls: Iterable[tuple[Key, Callable[..., Result], tuple[Any, ...]]],
     *,
     lost: str,
-    at_once: int | None = None,
 ) -> Generator[list[tuple[Key, Result | SarlError]], None, None]:
     """Make calls, and hand over what is done as it is done.
 
@@ -168,7 +167,6 @@ def completed(
         calls: What they are known by, a function that processes can find, and its arguments. The
             next one is asked for when there is room for it.
         lost: The sentence for when a process ended in the middle of its work.
-        at_once: How many calls are worked on at most, where each takes much memory.
 
     Yields:
         What was done since the last time, with the errors that are sentences; now and then nothing.
@@ -182,7 +180,7 @@ def completed(
     try:
         # One more than are worked on, so that nobody waits for this loop; not all at once, so that
         # another caller's come in between, and since each carries its arguments along.
-        most = workers_of(executor) + 1 if at_once is None else at_once
+        most = workers_of(executor) + 1
         while True:
             while len(running) < most and (call := next(waiting, None)) is not None:
                 key, work, arguments = call
@@ -225,7 +223,6 @@ def run_each(
     *,
     lost: str = _LOST,
     executor: Executor | None = None,
-    at_once: int | None = None,
     progress: Progress | None = None,
 ) -> list[Result]:
     """Do the same with different arguments.
@@ -235,7 +232,6 @@ def run_each(
         tasks: The arguments of each call.
         lost: The sentence for when a process ended in the middle of its work.
         executor: Its processes do the work; here, one after the other, where there is none.
-        at_once: How many calls they work on at most, where each takes much memory.
         progress: Told how many are done; may stop the rest.
 
     Returns:
@@ -254,7 +250,7 @@ def run_each(
         return done
     results: dict[int, Result] = {}
     calls = ((place, work, task) for place, task in enumerate(tasks))
-    with closing(completed(executor, calls, lost=lost, at_once=at_once)) as batches:
+    with closing(completed(executor, calls, lost=lost)) as batches:
         for batch in batches:
             for place, result in batch:
                 if isinstance(result, SarlError):

@@ -53,8 +53,8 @@ def elsewhere_notice(
     key = cross_fitting.key_of(demonstrations, divider)
     if thresholds.support < cross_fitting.least_support(demonstrations):
         st.caption(
-            f"What rules of fewer than {cross_fitting.FEWEST_STATES} states are worth in other "
-            "episodes is not found out where there are so many steps."
+            f"What rules with a support of less than {cross_fitting.LEAST_SUPPORT:.2%} are worth "
+            "in other episodes is not found out where there are so many steps."
         )
         return
     waiting = missed or key not in RESULTS

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from concurrent.futures import Executor
+from contextlib import nullcontext
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import WorkError
@@ -18,10 +19,12 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
 from sarl_core.mining.validation.recommendation import Recommendation, recommended
+from sarl_core.processes import Processes
 from sarl_core.progress import Progress, report
 from sarl_dashboard.cache import RESULTS, cached, keep, owner
 from sarl_dashboard.jobs.job import Job, Place
 from sarl_dashboard.jobs.mining import mining
+from sarl_dashboard.jobs.processes import own_process
 from sarl_dashboard.memory_cache import size_of
 from sarl_dashboard.state import combining, rule_base
 from sarl_dashboard.state.data import chosen_demonstrations, mined_data
@@ -29,8 +32,8 @@ from sarl_dashboard.state.mined import learner_of
 from sarl_dashboard.state.thresholds import MIN_DIVIDER, chosen_divider
 
 UNASKED = 250_000  # steps up to which it is made without being asked for
-FEWEST_STATES = 20
-"""Of a rule, where there are more steps: what is known of smaller ones takes most of the room."""
+LEAST_SUPPORT = 0.0001
+"""Of a rule, where there are more: what is known of smaller ones takes most of the room."""
 _MOST_SHARE = 0.75  # of the room for all results: the rest is for what it is about
 PLACE = Place[CrossFit]("elsewhere")
 DRAWING = 2.0  # seconds in which a browser draws a page; processes that start would hinder it
@@ -77,8 +80,7 @@ def known() -> CrossFit | None:
 
 def least_support(demonstrations: Demonstrations) -> float:
     """Of rules of which it is found out what they are worth elsewhere."""
-    steps = len(demonstrations)
-    return FEWEST_STATES / steps if steps > UNASKED else 0.0
+    return LEAST_SUPPORT if len(demonstrations) > UNASKED else 0.0
 
 
 def _trees_of(fit: CrossFit) -> tuple[str, ...]:
@@ -131,16 +133,17 @@ def begin(demonstrations: Demonstrations, divider: int, *, after: float = 0.0) -
 
     def work(executor: Executor, progress: Progress) -> CrossFit:
         _wait(after, progress)
-        return cross_fit(
-            demonstrations,
-            divider=divider,
-            combined=combined,
-            learner=learner,
-            min_support=least,
-            executor=executor,
-            at_once=1 if len(demonstrations) > UNASKED else None,
-            progress=progress,
-        )
+        is_large = len(demonstrations) > UNASKED and isinstance(executor, Processes)
+        with own_process() if is_large else nullcontext(executor) as workers:
+            return cross_fit(
+                demonstrations,
+                divider=divider,
+                combined=combined,
+                learner=learner,
+                min_support=least,
+                executor=workers,
+                progress=progress,
+            )
 
     def keep_fit(fit: CrossFit) -> None:
         if (size := size_of(fit.folds)) > _MOST_SHARE * RESULTS.most_bytes:

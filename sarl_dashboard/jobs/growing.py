@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from functools import partial
 
@@ -10,8 +9,9 @@ from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.memory import release
 from sarl_core.mining.growing.growth import EXACT_UP_TO, counted_trees, grow_structures
 from sarl_core.mining.tree import Learner
-from sarl_core.processes import Processes, run_each
+from sarl_core.processes import run_each
 from sarl_dashboard.jobs.job import Job, Place
+from sarl_dashboard.jobs.processes import own_process
 from sarl_dashboard.state.mined import Trees, growing_of, learner_of, trees_under_any_name
 
 PLACE = Place[Trees]("growing")
@@ -65,13 +65,8 @@ def job_of(demonstrations: Demonstrations, divider: int) -> Job[Trees]:
             job.done = min(seconds / expected, _MOST)
             return job.wanted()
 
-        # Its own process, since growing a tree can be ended in no other way.
-        # scikit-learn would load pandas, of which a tree has no use: a third of its memory.
-        executor = Processes(1, threads=os.cpu_count() or 1, without=("pandas",))
-        try:
+        with own_process() as executor:
             (grown,) = run_each(grow, [(states,)], executor=executor, progress=progress)
-        finally:
-            executor.shutdown(wait=False, cancel_futures=True)
         release()  # they came in one piece, which is as large as they are
         # Here, where the states are: trees with their counts are several times as large.
         keep(counted_trees(grown, states, divider=divider, learner=learner))

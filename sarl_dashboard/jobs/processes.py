@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import streamlit as st
 
@@ -20,3 +22,17 @@ def processes() -> Processes | ClusterExecutor:
     if address := os.environ.get(VARIABLE, ""):
         return lasting_executor(address)
     return Processes(min(max(os.cpu_count() or 1, 2), 8), gives_way=True)
+
+
+@contextmanager
+def own_process() -> Iterator[Processes]:
+    """One for work on very many steps, which ends with it, whether it is done or called off.
+
+    Growing a tree can be ended in no other way, and what a process has taken for it is given back.
+    """
+    # scikit-learn would load pandas, of which a tree has no use: a third of its memory.
+    executor = Processes(1, gives_way=True, threads=os.cpu_count() or 1, without=("pandas",))
+    try:
+        yield executor
+    finally:
+        executor.shutdown(wait=False, cancel_futures=True)

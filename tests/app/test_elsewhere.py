@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from functools import cache
@@ -9,6 +10,7 @@ from html import unescape
 from typing import Any
 
 import numpy as np
+import psutil
 import pytest
 from streamlit.testing.v1 import AppTest
 
@@ -16,6 +18,7 @@ from sarl_core import Demonstrations, load_demonstrations
 from sarl_core.explaining.words.cross_fit import elsewhere_text, judged_sentence
 from sarl_core.mining.rules import FILTERED, UNFILTERED, Thresholds
 from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
+from sarl_core.processes import Processes
 from sarl_core.progress import Progress, report
 from tests.app.screens import ROUTER, html, metrics, open_page
 
@@ -149,6 +152,36 @@ def test_what_takes_minutes_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> Non
     assert not [button for button in app.button if button.key == "elsewhere"]
 
 
+def test_of_many_steps_a_process_of_its_own_grows_the_trees_and_ends_with_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    open_page("names", data="pendulum")
+    module = sys.modules["sarl_dashboard.jobs.cross_fitting"]
+    fit, given = module.cross_fit, dict[int, Processes]()
+
+    def watched(*arguments: Any, executor: Processes, **named: Any) -> Any:
+        given[executor.submit(os.getpid).result()] = executor
+        return fit(*arguments, executor=executor, **named)
+
+    monkeypatch.setattr(module, "cross_fit", watched)
+    module.RESULTS.clear()
+    until(open_page("thresholds", data="pendulum"), "mined without it, they are right in")
+    monkeypatch.setattr(module, "UNASKED", 1_000)
+    module.RESULTS.clear()
+    app = open_page("thresholds", data="pendulum")
+    app.button(key="elsewhere").click().run()
+    until(app, "mined without it, they are right in")
+    (first, shared), (second, own) = given.items()
+    assert shared.workers >= 2
+    assert own.workers == 1
+    assert psutil.pid_exists(first)
+    for _ in range(300):
+        if not psutil.pid_exists(second):
+            break
+        time.sleep(0.1)
+    assert not psutil.pid_exists(second)
+
+
 def test_of_many_steps_rules_of_few_states_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     open_page("names", data="pendulum")
     module = sys.modules["sarl_dashboard.jobs.cross_fitting"]
@@ -166,5 +199,7 @@ def test_of_many_steps_rules_of_few_states_are_left_out(monkeypatch: pytest.Monk
     until(app, "mined without it, they are right in")
     app.button(key="unfiltered").click().run()
     assert not deltas(app)
-    assert "What rules of fewer than 20 states are worth in other episodes" in captions(app)
+    assert "What rules with a support of less than 0.01% are worth in other episodes" in captions(
+        app
+    )
     assert "mined without it" not in html(app)

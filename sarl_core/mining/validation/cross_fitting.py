@@ -302,7 +302,6 @@ def cross_fit(
     learner: Learner = "exact",
     min_support: float = 0.0,
     executor: Executor | None = None,
-    at_once: int | None = None,
     progress: Progress | None = None,
 ) -> CrossFit:
     """Grow trees without each fold of the episodes, and send the fold down them.
@@ -320,7 +319,6 @@ def cross_fit(
         min_support: Least share of the pairs, 0 to 1, of rules that are to be known: fully grown
             trees of very many pairs take several times as much memory.
         executor: Its processes grow the trees.
-        at_once: How many folds they work on at most; each takes much memory where pairs are many.
         progress: Told how many folds are done; may stop the rest.
 
     Returns:
@@ -352,7 +350,6 @@ def cross_fit(
         fold_of,
         [(parted, some, divider, tuple(combined), learner, min_support) for some in dealt],
         executor=executor,
-        at_once=at_once,
         progress=progress,
     )
     return CrossFit(tuple(fitted), whole, parted, min_support)
