@@ -24,7 +24,7 @@ from sarl_core.environments.failures import no_failures_text
 from sarl_core.errors import InputError
 from sarl_core.improving.alternation import ScoredStates, achieved, alternated, label_scores
 from sarl_core.improving.candidate import Candidate, Evaluator, structure_of
-from sarl_core.improving.first_rules import check_first_rules, first_trees
+from sarl_core.improving.first_rules import check_first_rules, first_trees, too_many
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import Answers, ask, importance
 from sarl_core.improving.questions import scores as expert_scores
@@ -196,7 +196,8 @@ def aggregate(
         expert: Who is asked: a trained policy, or an agent of the caller's own. One with a
             memory is asked about each episode from its start.
         first_rules: Those of the first round, as another aggregation gave them; mined from `start`
-            where None.
+            where None. Where they are more than the plan allows and there are no other rounds, the
+            refinement begins with leaving out one after the other, by what its episodes say.
         jobs: Processes; changes the speed, never the result.
         executor: Whose processes they are; this machine's where not given.
         progress: Called with (units done, in all); returning False stops.
@@ -209,7 +210,8 @@ def aggregate(
     Raises:
         InputError: If agent, expert and environment do not fit, or the expert acts at random; if
             failures are to count where nothing says what one is; or if the first rules do not fit.
-        CancelledError: If `progress` returned False before the first round was finished.
+        CancelledError: If `progress` returned False before the first round was finished, or before
+            a search had left out as many of the first rules as there are too many.
     """
     env_id = env_id or recorded_environment(start)
     check_choice(plan.choose, env_id)
@@ -234,7 +236,7 @@ def aggregate(
             run.select(clock)
         run.report(clock)
     except (CancelledError, KeyboardInterrupt, AgentFaultError, EpisodeFaultError) as error:
-        if not run.rounds:
+        if not run.rounds or run.is_too_long():
             raise
         fault = str(error) if isinstance(error, InputError) else ""
         return replace(run.result(), fault=fault)
@@ -300,7 +302,10 @@ class _Run:
         )
         self.first: tuple[PolicyTree, ...] | None = None
         self.first_rules = ""
+        self.search = plan.search()
         if first_rules is not None:
+            self.search = plan.search(pruned=too_many(first_rules, plan))
+            plan.check_turns(self.search)
             self.first = first_trees(first_rules, self.answers)
             self.first_rules = rules_digest(first_rules)
         self.rounds: list[AggregationRound] = []
@@ -311,7 +316,7 @@ class _Run:
 
     def planned_units(self) -> int:
         plan = self.plan
-        refined = plan.search.cost(plan.turns) if plan.turns else 0
+        refined = self.search.cost(plan.turns) if plan.turns else 0
         chosen = _choice_cost(plan, _most_choices(plan))
         return plan.rounds * plan.episodes + refined + chosen + plan.report
 
@@ -479,7 +484,7 @@ class _Run:
             expert=self.expert,
             combined=plan.combined,
             max_rules=plan.max_rules,
-            effort=plan.search,
+            effort=self.search,
             first=first,
             seed=plan.seed,
             jobs=self.jobs,
@@ -489,7 +494,9 @@ class _Run:
         def moved(candidate: Candidate) -> _Choice:
             pairs = self.answers.pairs(search.begun, derived=candidate.derived)
             trees = candidate.trees(pairs, plan.divider)
-            return _Choice(search.begun, trees, refined=candidate is not search.start)
+            return _Choice(
+                search.begun, trees, refined=search.is_pruned or candidate is not search.start
+            )
 
         def better(candidate: Candidate) -> None:
             # By the episodes of the search only: for who stops before the validation.
@@ -504,6 +511,10 @@ class _Run:
         index, mean = self.best_of([self.rules(one.trees) for one in choices], chosen_by, clock)
         self.choice = replace(choices[index], mean=mean)
         self.seeds = self.seeds._replace(validation=chosen_by)
+
+    def is_too_long(self) -> bool:
+        """Whether all that is there yet are more rules to begin with than there may be."""
+        return self.search.pruned > 0 and self.choice is None
 
     def worth(self) -> float:
         """What a failure counts in a search: as much as the returns of the rounds differ."""

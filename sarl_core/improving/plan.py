@@ -115,22 +115,36 @@ class Plan:
                 f"the worth of a failure is {self.search_worth:g}; give a number from 0 to "
                 f"{_MOST_WORTH:g}"
             )
-        _check_number("number of turns", self.turns, 0, self._most_turns())
+        self.check_turns(self.search())
 
-    @property
-    def search(self) -> SearchEffort:
-        """How much the refinement tries, which may begin with each round."""
+    def search(self, *, pruned: int = 0) -> SearchEffort:
+        """How much the refinement tries, which may begin with each round.
+
+        Args:
+            pruned: Rules that it begins with beyond the budget.
+        """
         return SearchEffort(
             self.search_episodes,
             self.rounds,
             self.search_starts,
             self.search_steps,
             self.search_generations,
+            pruned,
         )
 
-    def _most_turns(self) -> int:
-        """Of which the seeds of one run are enough."""
-        none, one = (self.search.seeds(turns) for turns in range(2))
+    def check_turns(self, search: SearchEffort) -> None:
+        """Refuse more turns than the seeds of one run are enough for.
+
+        Args:
+            search: As `search` gives it.
+
+        Raises:
+            InputError: If they are not.
+        """
+        _check_number("number of turns", self.turns, 0, self._most_turns(search))
+
+    def _most_turns(self, search: SearchEffort) -> int:
+        none, one = (search.seeds(turns) for turns in range(2))
         left = SEEDS_A_RUN - none
         if self.turns and left < one - none:
             raise InputError(

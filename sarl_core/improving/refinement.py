@@ -28,7 +28,7 @@ from sarl_core.improving.policy_improvement import (
     PolicyImprovement,
 )
 from sarl_core.improving.questions import answered, ask, scores, with_values
-from sarl_core.improving.shapes import MetStates, neighbours
+from sarl_core.improving.shapes import MetStates, neighbours, with_a_rule_less
 from sarl_core.improving.successive_halving import (
     Selection,
     planned_episodes,
@@ -55,6 +55,10 @@ _STARTS = 8  # of which one is moved before the first turn, `_SHAPES` at least
 _EARLY = 4  # generations for each of them before the worse half is left, then twice as many, ...
 _EARLY_STEPS = 1  # or so many steps
 _LATE = 16  # further ones for the best, in each turn, where nothing else is said
+_LEFT_OUT = 24  # rules of which one is left out: those that are met least
+_AT_A_TIME = 3  # rules that are left out before thresholds are moved
+_BETWEEN = 12  # generations of that
+_NEAR = 0.06  # the first step there: what is pruned was good as it was
 _SOONER = 3  # part of their episodes after which the worse half is left, where there are more
 
 # Times the episodes of a neighbour:
@@ -94,6 +98,7 @@ class SearchEffort:
             place of neighbours in shape; then what it may begin with is moved in the same way.
         late: Generations in which the thresholds of the best are moved, in each turn; 16 where
             None. Of more than 16 each leaves its worse half sooner.
+        pruned: Rules more than there may be, which are left out first, one after the other.
     """
 
     episodes: int
@@ -101,12 +106,18 @@ class SearchEffort:
     moved: int | None = None
     steps: int = 0
     late: int | None = None
+    pruned: int = 0
 
     @property
     def ways(self) -> int:
         """How many starts are moved."""
         usual = max(_SHAPES, self.starts // _STARTS)
         return min(self.starts, usual if self.moved is None else self.moved)
+
+    @property
+    def prunings(self) -> int:
+        """How often thresholds are moved while rules are left out."""
+        return -(-self.pruned // _AT_A_TIME)
 
     @property
     def generations(self) -> int:
@@ -146,7 +157,10 @@ class SearchEffort:
             changed = self.steps * step + met
         moved_on = self.generations * moved(_CAREFUL)
         turn = met + changed + moved_on + 2 * compared
-        return _EXPERT * episodes + before + (begun if self.starts > 1 else 0) + turns * turn
+        begun = begun if self.starts > 1 else 0
+        pruned = self.pruned * (met + ranked(_LEFT_OUT, _COMPARED))
+        pruned += self.prunings * (met + _BETWEEN * moved(_CAREFUL) + compared)
+        return _EXPERT * episodes + before + begun + pruned + turns * turn
 
     def seeds(self, turns: int) -> int:
         """Most seeds of them: all that are compared play the same episodes."""
@@ -164,7 +178,10 @@ class SearchEffort:
         begun = _COMPARED + _MET + halved(self.ways) + _COMPARED
         changed = self.steps * step + _MET if self.steps else _RANKED + halved(_SHAPES)
         turn = _MET + changed + _COMPARED + self.generations * _CAREFUL + _COMPARED
-        return self.episodes * (_EXPERT + before + (begun if self.starts > 1 else 0) + turns * turn)
+        begun = begun if self.starts > 1 else 0
+        pruned = self.pruned * (_MET + _COMPARED)
+        pruned += self.prunings * (_MET + _BETWEEN * _CAREFUL + _COMPARED)
+        return self.episodes * (_EXPERT + before + begun + pruned + turns * turn)
 
 
 Way: TypeAlias = Movement | PolicyImprovement
@@ -209,6 +226,7 @@ class Refinement:
         # What it began with, and its index among those it might have.
         self.begun, self.start = 0, self._starts[0]
         self.here = self.start
+        self.is_pruned = False  # whether it began with more rules than that has
         self._way: Movement | None = None  # that led here
         self._step = FIRST_STEP  # how wide its steps were in the end
         self._pairs = pairs
@@ -266,9 +284,11 @@ class Refinement:
         """Begin with what achieves most when it is moved."""
         self._evaluator = replace(self._evaluator, max_steps=self._patience())
         if len(self._starts) == 1:
-            self._better(self.start)
+            self._prune()
+            self._better(self.here)
             if self._effort.steps:
                 self._improvement = self._improving(self.start)
+            self._tell(self._effort.cost(0) - self._done)  # some had fewer rules to leave out
             return
         ranking = self._ranking(self._starts, self._pairs, _COMPARED)
         self._begin_with(ranking[0])
@@ -302,6 +322,33 @@ class Refinement:
         else:
             self._way, self._improvement = None, way
         self._better(self.here)
+
+    def _prune(self) -> None:
+        """Leave rules out, one after the other, until there are no more than there may be."""
+        if self._effort.pruned:
+            self._step = _NEAR
+        pruned = 0
+        while tried := self._with_a_rule_less(met := self._met()):
+            self.here = tried[self._ranking(tried, met.pairs, _COMPARED)[0]]
+            pruned += 1
+            if pruned % _AT_A_TIME == 0:
+                self._move_after_pruning()
+        if pruned % _AT_A_TIME:
+            self._move_after_pruning()
+        self.start, self.is_pruned = self.here, pruned > 0
+
+    def _with_a_rule_less(self, met: MetStates) -> list[Candidate]:
+        pairs = met.pairs.deriving(self.here.derived)
+        trees = self.here.trees(pairs, self._evaluator.divider)
+        return with_a_rule_less(trees, pairs, max_rules=self._max_rules, count=_LEFT_OUT)
+
+    def _move_after_pruning(self) -> None:
+        met = self._met()
+        way = self._movement(self.here, met)
+        self._move(way, _BETWEEN, met, times=_CAREFUL)
+        self._step = way.step
+        if self._is_as_good(way.here, self.here, met):
+            self.here = way.here
 
     def _patience(self) -> int:
         """Steps after which an episode of the search is left.

@@ -98,6 +98,39 @@ def neighbours(
     return result
 
 
+def with_a_rule_less(
+    trees: Sequence[PolicyTree], pairs: Demonstrations, *, max_rules: int, count: int
+) -> list[Candidate]:
+    """Trees with a leaf less, where there are too many.
+
+    Args:
+        trees: One an action dimension, counted over `pairs`.
+        pairs: States that they lead to.
+        max_rules: Most leaves of each.
+        count: Of the trees given back, at most: of those without a leaf that few states reach.
+
+    Returns:
+        Different from each other.
+    """
+    structures = [structure_of(tree) for tree in trees]
+    places = []
+    for index, tree in enumerate(trees):
+        if (tree.feature == LEAF).sum() <= max_rules:
+            continue
+        for node, stays in _merges(structures[index]):
+            left, right = tree.children_left[node], tree.children_right[node]
+            gone = int(right if stays == left else left)
+            if tree.feature[gone] == LEAF:
+                places.append((int(tree.samples[gone]), index, node, stays))
+    less: dict[tuple[object, ...], Candidate] = {}
+    for _, index, node, stays in sorted(places)[:count]:
+        changed = without_query(structures[index], node, stays)
+        both = [*structures[:index], changed, *structures[index + 1 :]]
+        candidate = Candidate.of(both, pairs.derived, observed=len(pairs.observed))
+        less.setdefault(candidate.key, candidate)
+    return list(less.values())
+
+
 def _shuffled(
     places: list[tuple[int, int, int]], generator: np.random.Generator
 ) -> list[tuple[int, int, int]]:

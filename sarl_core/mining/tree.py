@@ -257,6 +257,21 @@ class PolicyTree:
         )
 
 
+def without_rows(tree: PolicyTree) -> PolicyTree:
+    """A tree that holds no longer which pairs reach its nodes, only how many.
+
+    Args:
+        tree: Any.
+
+    Returns:
+        The same, with M = 0 rows.
+    """
+    none = tree.sample_order[:0].copy()
+    return replace(
+        tree, sample_order=none, sample_place=none, demonstrated=tree.demonstrated[:0].copy()
+    )
+
+
 def source_of(trees: Sequence[PolicyTree]) -> Source:
     """What the trees of one rule set were grown from.
 

@@ -13,8 +13,12 @@ from sarl_core.improving.aggregation import aggregate
 from sarl_core.improving.aggregation_files import aggregation_card
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.refinement import Refinement
+from sarl_core.improving.shapes import with_a_rule_less
 from sarl_core.mining.rule_set import RuleSet, load_rules, rules_digest
+from sarl_core.mining.rule_tree import recount
 from sarl_core.mining.rules import Thresholds
+from sarl_core.mining.tree import LEAF
+from sarl_core.progress import CancelledError
 from sarl_core.shielding.shield import Shield
 
 DATA = EXPERT_FOLDER.parent
@@ -71,6 +75,56 @@ def test_a_search_begins_with_them(cart, small_search, monkeypatch):
     assert len(found.rule_set) == len(rules) == 2
 
 
+def test_rules_beyond_the_budget_are_left_out_one_after_the_other(cart, small_search):
+    ticks = []
+    rules = shipped("cartpole_compact")
+    plan = replace(PLAN, max_rules=2, turns=1, search_episodes=2, validation=8)
+    found = aggregate(
+        cart, plan, first_rules=rules, progress=lambda *tick: ticks.append(tick) or True
+    )
+    assert (len(rules), len(found.rule_set)) == (3, 2)
+    assert found.refined
+    assert [one.rules for one in found.rounds] == [3]
+    done, totals = [done for done, _ in ticks], {total for _, total in ticks}
+    assert done == sorted(done)
+    assert totals == {done[-1]}
+    again = aggregate(cart, plan, first_rules=rules, jobs=2)
+    assert rules_digest(again.rule_set) == rules_digest(found.rule_set)
+
+
+@pytest.mark.parametrize(("share", "stays"), [(0.3, False), (0.9, True)])
+def test_who_stops_has_no_more_rules_than_were_asked_for(share, stays, cart, small_search):
+    plan = replace(PLAN, max_rules=2, turns=1, search_episodes=2)
+    given = {
+        "first_rules": shipped("cartpole_compact"),
+        "progress": lambda done, total: done < share * total,
+    }
+    if stays:
+        found = aggregate(cart, plan, **given)
+        assert len(found.rule_set) == 2
+        assert not found.is_finished
+    else:
+        with pytest.raises(CancelledError):
+            aggregate(cart, plan, **given)
+
+
+def test_what_few_states_meet_is_left_out_first():
+    start = load_demonstrations(DATA / "demonstrations" / "lunar_lander.parquet").select(range(20))
+    (tree,) = recount(shipped("lunar_lander_compact"), start)
+    leaves = np.flatnonzero(tree.feature == LEAF)
+    every = with_a_rule_less([tree], start, max_rules=44, count=100)
+    few = with_a_rule_less([tree], start, max_rules=44, count=5)
+    assert with_a_rule_less([tree], start, max_rules=45, count=100) == []
+    before = tree.label[tree.apply(start.observations)]
+    rare = np.sort(tree.samples[leaves])
+    assert [one.key for one in few] == [one.key for one in every[:5]]
+    for most, one in zip(rare.tolist(), every, strict=False):
+        (less,) = one.trees(start, 2)
+        after = less.label[less.apply(start.observations)]
+        assert (less.feature == LEAF).sum() < len(leaves)
+        assert (after != before).sum() <= most
+
+
 @pytest.mark.parametrize(
     ("task", "name", "plan", "sentence"),
     [
@@ -78,7 +132,7 @@ def test_a_search_begins_with_them(cart, small_search, monkeypatch):
             "cartpole",
             "cartpole_compact",
             replace(PLAN, max_rules=2),
-            "give --max-rules 3, or fewer",
+            "give --max-rules 3, fewer rules, or --rounds 1 and --refine",
         ),
         (
             "cartpole",

@@ -29,7 +29,7 @@ from sarl_core.mining.evidence import EpisodeCounts, HeldOut, held_out_of
 from sarl_core.mining.growing.growth import cut_back, fewest_pairs, grow_policy_trees
 from sarl_core.mining.rule_set import RuleSet
 from sarl_core.mining.rules import Thresholds
-from sarl_core.mining.tree import Learner, PolicyTree
+from sarl_core.mining.tree import Learner, PolicyTree, without_rows
 from sarl_core.mining.validation.episode_counts import (
     Influence,
     LeafCounts,
@@ -57,7 +57,7 @@ class Fold:
     """Trees, and the episodes that they were grown without.
 
     Attributes:
-        trees: One an action dimension.
+        trees: One an action dimension, without the rows that they were counted over.
         leaves: Those episodes at their leaves.
     """
 
@@ -376,16 +376,19 @@ def fold_of(
     Returns:
         Both.
     """
-    others = np.setdiff1d(demonstrations.episodes, episodes)
-    mined, judged = demonstrations.select(others), demonstrations.select(episodes)
+    mined = demonstrations.select(np.setdiff1d(demonstrations.episodes, episodes))
     if combined:
         mined = chosen_again(mined, combined, divider=divider)
-        judged = judged.deriving(mined.derived)
     trees = grow_policy_trees(mined, divider=divider, learner=learner)
     least = fewest_pairs(min_support, len(mined))
     if least > 2:  # a pair alone is split no further
         trees = tuple(cut_back(tree, least, mined) for tree in trees)
-    return Fold(trees, tuple(count_leaves(tree, judged) for tree in trees))
+    judged = demonstrations.select(episodes)
+    if combined:
+        judged = judged.deriving(mined.derived)
+    leaves = tuple(count_leaves(tree, judged) for tree in trees)
+    # Nobody asks which pairs they are, and of many pairs that takes more room than all else.
+    return Fold(tuple(map(without_rows, trees)), leaves)
 
 
 def _in_stretches(demonstrations: Demonstrations, count: int) -> Demonstrations:

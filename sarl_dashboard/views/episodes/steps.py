@@ -65,7 +65,7 @@ def show_episodes(demonstrations: Demonstrations) -> None:
         show_scene(demonstrations, episode, current)
 
 
-@cached()
+@cached(show_spinner="Holding the rules against the episode …")
 def _held(rule_set: RuleSet, demonstrations: Demonstrations, episode: int) -> Audit:
     return audit(rule_set, demonstrations.select([episode]))
 
