@@ -91,9 +91,9 @@ def aggregate(
             metavar="RULES.json",
             show_default=False,
             help="The rules of the first round, as this command wrote them: a search is gone on "
-            "with, or rules that a person has changed are searched around. Where there are more than "
-            "--max-rules, --refine leaves out one after the other first (with --rounds 1). Give "
-            "another --seed than made them: the same one plays the same episodes.",
+            "with, or rules that a person has changed are searched around. Of more of them than "
+            "--max-rules a refinement (--rounds 1 --refine 1) first leaves out one after another. "
+            "Give another --seed than made them: the same one plays the same episodes.",
         ),
     ] = None,
     rounds: Annotated[

@@ -145,12 +145,12 @@ def test_bad_data_is_the_readers_sentence(fail, tmp_path):
 
 
 def test_failed_work_is_code_1(fail, monkeypatch):
-    import plotly.graph_objects as go
+    import kaleido
 
     def no_browser(*_, **__):
         raise RuntimeError("No browser was found. Install one.")
 
-    monkeypatch.setattr(go.Figure, "to_image", no_browser)
+    monkeypatch.setattr(kaleido, "Kaleido", no_browser)
     assert "Chromium" in fail("landscape", CART, "--out", "landscape.png", code=1)
 
 

@@ -31,10 +31,13 @@ _BROWSER = "BROWSER_PATH"  # environment variable that Kaleido goes by
 
 
 @contextmanager
-def drawing_pictures() -> Iterator[Draw]:
+def drawing_pictures(*, otherwise: str = "leave the pictures out") -> Iterator[Draw]:
     """Start a browser once and draw many figures with it; starting takes longer than drawing.
 
     The browser is tried at once, so that who has none learns it before the work and not after.
+
+    Args:
+        otherwise: What to advise who has no browser, besides installing one.
 
     Yields:
         To be called with each figure.
@@ -44,7 +47,7 @@ def drawing_pictures() -> Iterator[Draw]:
     """
     # In a thread of its own, because the caller's may run an event loop already.
     with ThreadPoolExecutor(1) as thread:
-        session = thread.submit(_Session).result()
+        session = thread.submit(_Session, otherwise).result()
         try:
             yield lambda figure: thread.submit(session.draw, figure).result()
         finally:
@@ -54,9 +57,10 @@ def drawing_pictures() -> Iterator[Draw]:
 class _Session:
     """A browser in the event loop of one thread."""
 
-    def __init__(self) -> None:
+    def __init__(self, otherwise: str) -> None:
         import plotly.graph_objects as go
 
+        self.otherwise = otherwise
         self.runner = asyncio.Runner()
         self.browser: Any = None
         try:
@@ -75,7 +79,7 @@ class _Session:
             return self._within_patience(self._drawn(figure))
         except Exception:
             self._end()
-            raise without_browser(first, _WHAT, "leave the pictures out") from first
+            raise without_browser(first, _WHAT, self.otherwise) from first
 
     async def _drawn(self, figure: go.Figure) -> bytes:
         import kaleido
@@ -107,7 +111,7 @@ class _Session:
 
 
 def figure_to_png(figure: go.Figure) -> bytes:
-    """Draw a Plotly figure as a picture, two pixels for one so that text is sharp.
+    """Draw one Plotly figure as a picture, two pixels for one so that text is sharp.
 
     Args:
         figure: To draw, at the size its layout says.
@@ -118,12 +122,8 @@ def figure_to_png(figure: go.Figure) -> bytes:
     Raises:
         WorkError: If there is no Chromium or Chrome to draw it with.
     """
-    _silence_browser()
-    try:
-        picture: bytes = figure.to_image(format="png", scale=_SCALE)
-    except Exception as error:  # whatever Kaleido or the browser has to complain about
-        raise without_browser(error, _WHAT, "write .html") from error
-    return picture
+    with drawing_pictures(otherwise="write .html") as draw:
+        return draw(figure)
 
 
 def sheet(rows: Sequence[Sequence[bytes]]) -> bytes:
