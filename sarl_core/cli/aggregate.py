@@ -92,7 +92,7 @@ def aggregate(
             show_default=False,
             help="The rules of the first round, as this command wrote them: a search is gone on "
             "with, or rules that a person has changed are searched around. Of more of them than "
-            "--max-rules a refinement (--rounds 1 --refine 1) first leaves out one after another. "
+            "--max-rules a refinement (--rounds 1 --refine N) first leaves out one after another. "
             "Give another --seed than made them: the same one plays the same episodes.",
         ),
     ] = None,
@@ -308,7 +308,8 @@ def aggregate(
     terminal.print_lines(
         [
             f"Wrote {out}: {card['rules']} rules of round {aggregation.chosen}"
-            f"{', refined' if aggregation.refined else ''}.",
+            f"{', refined' if aggregation.refined else ''}"
+            f"{f', {aggregation.left_out} left out' if aggregation.left_out else ''}.",
             f"Mean return {reported['mean']:.1f} over {reported['episodes']} episodes used for "
             f"nothing else (deviation {reported['std']:.1f}, least {reported['min']:.1f}).",
             *_beside(reported, card["env_id"]),

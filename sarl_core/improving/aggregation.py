@@ -24,7 +24,7 @@ from sarl_core.environments.failures import no_failures_text
 from sarl_core.errors import InputError
 from sarl_core.improving.alternation import ScoredStates, achieved, alternated, label_scores
 from sarl_core.improving.candidate import Candidate, Evaluator, structure_of
-from sarl_core.improving.first_rules import check_first_rules, first_trees, too_many
+from sarl_core.improving.first_rules import check_first_rules, first_trees
 from sarl_core.improving.plan import Plan
 from sarl_core.improving.questions import Answers, ask, importance
 from sarl_core.improving.questions import scores as expert_scores
@@ -36,7 +36,7 @@ from sarl_core.mining.combining.queries import trees_over_used
 from sarl_core.mining.envelope import with_boxes
 from sarl_core.mining.growing.structure import count_tree
 from sarl_core.mining.rule_set import RuleSet, rules_digest
-from sarl_core.mining.tree import PolicyTree
+from sarl_core.mining.tree import LEAF, PolicyTree
 from sarl_core.progress import CancelledError, Progress, report
 from sarl_core.rollouts import seeds
 from sarl_core.rollouts.choices import check_choice, mean_score, scores
@@ -143,6 +143,11 @@ class Aggregation:
             else ()
         )
         return (*clauses, *(() if self.reported is None else self.reported.remarks))
+
+    @property
+    def left_out(self) -> int:
+        """How many of the rules that it began with are no longer there; 0 where they were mined."""
+        return max(self.rounds[0].rules - len(self.rule_set), 0) if self.first_rules else 0
 
     @property
     def is_finished(self) -> bool:
@@ -304,10 +309,12 @@ class _Run:
         self.first_rules = ""
         self.search = plan.search()
         if first_rules is not None:
-            self.search = plan.search(pruned=too_many(first_rules, plan))
-            plan.check_turns(self.search)
             self.first = first_trees(first_rules, self.answers)
             self.first_rules = rules_digest(first_rules)
+            if plan.rounds == 1:
+                beyond = Candidate.of_trees(self.first).beyond(plan.max_rules)
+                self.search = plan.search(pruned=beyond)
+                plan.check_turns(self.search)
         self.rounds: list[AggregationRound] = []
         self.trees: list[tuple[PolicyTree, ...]] = []
         self.choice: _Choice | None = None
@@ -514,7 +521,10 @@ class _Run:
 
     def is_too_long(self) -> bool:
         """Whether all that is there yet are more rules to begin with than there may be."""
-        return self.search.pruned > 0 and self.choice is None
+        if self.plan.thresholds is not None or self.choice is not None:
+            return False
+        leaves = [int((tree.feature == LEAF).sum()) for tree in self.trees[0]]
+        return max(leaves) > self.plan.max_rules
 
     def worth(self) -> float:
         """What a failure counts in a search: as much as the returns of the rounds differ."""

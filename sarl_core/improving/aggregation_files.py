@@ -122,6 +122,7 @@ def aggregation_card(aggregation: Aggregation, *, command: str) -> dict[str, Any
         **({} if plan.max_steps is None else {"max_steps": plan.max_steps}),
         **({"combined": _combined(aggregation)} if plan.combined else {}),
         **({"first_rules": aggregation.first_rules} if aggregation.first_rules else {}),
+        **({"left_out": aggregation.left_out} if aggregation.left_out else {}),
         "episodes_a_round": plan.episodes,
         "turns": plan.turns,
         **({"search_episodes": plan.search_episodes} if plan.turns else {}),

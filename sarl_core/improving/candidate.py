@@ -76,6 +76,16 @@ class Candidate:
         )
 
     @property
+    def asks(self) -> bool:
+        """Whether what it says depends on the state."""
+        return any(len(one.feature) > 1 for one in self.structures)
+
+    def beyond(self, max_rules: int) -> int:
+        """How many leaves there are too many, over all trees of at most so many."""
+        leaves = [int((one.feature == LEAF).sum()) for one in self.structures]
+        return sum(max(count - max_rules, 0) for count in leaves)
+
+    @property
     def key(self) -> tuple[object, ...]:
         """What it has in common with those that act alike, node for node."""
         return (

@@ -37,30 +37,13 @@ def check_first_rules(rules: RuleSet, plan: Plan) -> None:
             f"the rules to begin with are of divider {rules.divider}, and the rounds of "
             f"{plan.divider}; give --divider {rules.divider}"
         )
-    if too_many(rules, plan) and not (plan.turns and plan.rounds == 1):
-        most = max(_counts(rules))
+    most = max(len(rules.of_dimension(index)) for index in range(len(rules.actions)))
+    if most > plan.max_rules and not (plan.turns and plan.rounds == 1):
         raise InputError(
             f"there are {most} rules to begin with for one action dimension, and the budget is "
             f"{plan.max_rules}; give --max-rules {most}, fewer rules, or --rounds 1 and --refine, "
             "which leaves some of them out"
         )
-
-
-def too_many(rules: RuleSet, plan: Plan) -> int:
-    """How many of the rules a refinement has to leave out.
-
-    Args:
-        rules: To begin with.
-        plan: Of the aggregation.
-
-    Returns:
-        Over all action dimensions.
-    """
-    return sum(max(count - plan.max_rules, 0) for count in _counts(rules))
-
-
-def _counts(rules: RuleSet) -> list[int]:
-    return [len(rules.of_dimension(index)) for index in range(len(rules.actions))]
 
 
 def first_trees(rules: RuleSet, answers: Answers) -> tuple[PolicyTree, ...]:

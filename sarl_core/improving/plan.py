@@ -149,8 +149,12 @@ class Plan:
         if self.turns and left < one - none:
             raise InputError(
                 f"the first turn and what comes before it take {one:,} episodes of their own, and "
-                f"one run has {SEEDS_A_RUN:,}; give fewer rounds, --search-steps, "
-                "--search-generations or --search-episodes"
+                f"one run has {SEEDS_A_RUN:,}; give "
+                + (
+                    "a larger --max-rules, or fewer --search-episodes"
+                    if search.pruned
+                    else "fewer rounds, --search-steps, --search-generations or --search-episodes"
+                )
             )
         return max(left, 0) // (one - none)
 

@@ -216,7 +216,8 @@ class Refinement:
             expert: Who is asked about the states that they lead to.
             combined: Pairs of features of which new queries may ask about combinations.
             max_rules: Most leaves of each tree.
-            effort: How much is tried; of these starts, however many it says.
+            effort: How much is tried; of these starts, and the rules of a single one that are too
+                many, however many it says.
             first: Seed of the first episode.
             seed: Another one gives another way.
             jobs: Processes; changes the speed, never the result.
@@ -226,7 +227,6 @@ class Refinement:
         # What it began with, and its index among those it might have.
         self.begun, self.start = 0, self._starts[0]
         self.here = self.start
-        self.is_pruned = False  # whether it began with more rules than that has
         self._way: Movement | None = None  # that led here
         self._step = FIRST_STEP  # how wide its steps were in the end
         self._pairs = pairs
@@ -235,10 +235,16 @@ class Refinement:
         self._done = self._total = 0
         self._evaluator, self._expert = evaluator, expert
         self._combined, self._max_rules = combined, max_rules
-        self._effort = replace(effort, starts=len(starts))
+        beyond = self.here.beyond(max_rules) if len(starts) == 1 else 0
+        self._effort = replace(effort, starts=len(starts), pruned=beyond)
         self._improvement: PolicyImprovement | None = None  # that led here
         self._next, self._generator = first, np.random.default_rng(seed)
         self._workers = executor_of(jobs, executor)
+
+    @property
+    def is_pruned(self) -> bool:
+        """Whether it leaves out rules that it begins with, because they are too many."""
+        return self._effort.pruned > 0
 
     def run(
         self,
@@ -284,11 +290,12 @@ class Refinement:
         """Begin with what achieves most when it is moved."""
         self._evaluator = replace(self._evaluator, max_steps=self._patience())
         if len(self._starts) == 1:
-            self._prune()
+            if self.is_pruned:
+                self._prune()
             self._better(self.here)
             if self._effort.steps:
                 self._improvement = self._improving(self.start)
-            self._tell(self._effort.cost(0) - self._done)  # some had fewer rules to leave out
+            self._tell(self._effort.cost(0) - self._done)  # a rule less may have been several
             return
         ranking = self._ranking(self._starts, self._pairs, _COMPARED)
         self._begin_with(ranking[0])
@@ -325,17 +332,19 @@ class Refinement:
 
     def _prune(self) -> None:
         """Leave rules out, one after the other, until there are no more than there may be."""
-        if self._effort.pruned:
-            self._step = _NEAR
+        self._step = _NEAR
         pruned = 0
-        while tried := self._with_a_rule_less(met := self._met()):
+        while self.here.beyond(self._max_rules):
+            met = self._met()
+            tried = self._with_a_rule_less(met)
             self.here = tried[self._ranking(tried, met.pairs, _COMPARED)[0]]
             pruned += 1
-            if pruned % _AT_A_TIME == 0:
+            fits = not self.here.beyond(self._max_rules)
+            if fits:
+                self._better(self.here)
+            if fits or pruned % _AT_A_TIME == 0:
                 self._move_after_pruning()
-        if pruned % _AT_A_TIME:
-            self._move_after_pruning()
-        self.start, self.is_pruned = self.here, pruned > 0
+        self.start = self.here
 
     def _with_a_rule_less(self, met: MetStates) -> list[Candidate]:
         pairs = met.pairs.deriving(self.here.derived)

@@ -83,8 +83,7 @@ def neighbours(
                 return
             both = [*structures[:index], changed, *structures[index + 1 :]]
             candidate = Candidate.of(both, met.pairs.derived, observed=observed)
-            asks = any(len(one.feature) > 1 for one in candidate.structures)
-            if asks and candidate.key not in known:
+            if candidate.asks and candidate.key not in known:
                 known.add(candidate.key)
                 result.append(candidate)
                 most -= 1
@@ -123,11 +122,12 @@ def with_a_rule_less(
             if tree.feature[gone] == LEAF:
                 places.append((int(tree.samples[gone]), index, node, stays))
     less: dict[tuple[object, ...], Candidate] = {}
-    for _, index, node, stays in sorted(places)[:count]:
+    for _, index, node, stays in sorted(places):
         changed = without_query(structures[index], node, stays)
         both = [*structures[:index], changed, *structures[index + 1 :]]
         candidate = Candidate.of(both, pairs.derived, observed=len(pairs.observed))
-        less.setdefault(candidate.key, candidate)
+        if candidate.asks and len(less) < count:
+            less.setdefault(candidate.key, candidate)
     return list(less.values())
 
 

@@ -80,8 +80,8 @@ def elsewhere_notice(
                 icon=":material/play_arrow:",
                 on_click=cross_fitting.begin,
                 args=(demonstrations, divider),
-                help=f"Of more than {cross_fitting.UNASKED:,} steps this takes minutes, and a "
-                "processor",
+                help=f"Of more than {cross_fitting.UNASKED:,} steps this takes minutes, and "
+                "what nobody else needs of the processors",
             )
         elif takes_minutes:
             run_bar(cross_fitting.PLACE, None)

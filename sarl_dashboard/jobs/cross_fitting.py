@@ -19,7 +19,6 @@ from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import PolicyTree
 from sarl_core.mining.validation.cross_fitting import CrossFit, Judged, cross_fit
 from sarl_core.mining.validation.recommendation import Recommendation, recommended
-from sarl_core.processes import Processes
 from sarl_core.progress import Progress, report
 from sarl_dashboard.cache import RESULTS, cached, keep, owner
 from sarl_dashboard.jobs.job import Job, Place
@@ -133,8 +132,9 @@ def begin(demonstrations: Demonstrations, divider: int, *, after: float = 0.0) -
 
     def work(executor: Executor, progress: Progress) -> CrossFit:
         _wait(after, progress)
-        is_large = len(demonstrations) > UNASKED and isinstance(executor, Processes)
-        with own_process() if is_large else nullcontext(executor) as workers:
+        # One fold after the other where there are many steps, and here, where they are.
+        is_large = len(demonstrations) > UNASKED
+        with own_process(gives_way=True) if is_large else nullcontext(executor) as workers:
             return cross_fit(
                 demonstrations,
                 divider=divider,

@@ -25,13 +25,16 @@ def processes() -> Processes | ClusterExecutor:
 
 
 @contextmanager
-def own_process() -> Iterator[Processes]:
+def own_process(*, gives_way: bool = False) -> Iterator[Processes]:
     """One for work on very many steps, which ends with it, whether it is done or called off.
 
     Growing a tree can be ended in no other way, and what a process has taken for it is given back.
+
+    Args:
+        gives_way: Whether whoever serves pages goes first: not where a page waits for it.
     """
     # scikit-learn would load pandas, of which a tree has no use: a third of its memory.
-    executor = Processes(1, gives_way=True, threads=os.cpu_count() or 1, without=("pandas",))
+    executor = Processes(1, gives_way=gives_way, threads=os.cpu_count() or 1, without=("pandas",))
     try:
         yield executor
     finally:

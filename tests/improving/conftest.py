@@ -17,6 +17,7 @@ SMALL = {
     "_EARLY": 1,
     "_LATE": 1,
     "_COMPARED": 2,
+    "_BETWEEN": 1,
 }
 
 

@@ -18,7 +18,7 @@ from sarl_core.mining.rule_set import RuleSet, load_rules, rules_digest
 from sarl_core.mining.rule_tree import recount
 from sarl_core.mining.rules import Thresholds
 from sarl_core.mining.tree import LEAF
-from sarl_core.progress import CancelledError
+from sarl_core.rollouts.seeds import REFINEMENT
 from sarl_core.shielding.shield import Shield
 
 DATA = EXPERT_FOLDER.parent
@@ -88,24 +88,70 @@ def test_rules_beyond_the_budget_are_left_out_one_after_the_other(cart, small_se
     done, totals = [done for done, _ in ticks], {total for _, total in ticks}
     assert done == sorted(done)
     assert totals == {done[-1]}
+    card = aggregation_card(found, command="")
+    assert (card["left_out"], card["budget"], card["refined"]) == (1, 2, True)
     again = aggregate(cart, plan, first_rules=rules, jobs=2)
     assert rules_digest(again.rule_set) == rules_digest(found.rule_set)
 
 
-@pytest.mark.parametrize(("share", "stays"), [(0.3, False), (0.9, True)])
-def test_who_stops_has_no_more_rules_than_were_asked_for(share, stays, cart, small_search):
+@pytest.mark.parametrize(("name", "most"), [("cartpole_compact", 3), ("lunar_lander_compact", 41)])
+def test_as_many_seeds_are_taken_as_are_planned(name, most, small_search, monkeypatch):
+    """With nothing to leave out, and with four rules too many, between which all is moved."""
+    searches = []
+    run = Refinement.run
+    monkeypatch.setattr(
+        Refinement, "run", lambda self, *_, **named: searches.append(self) or run(self, 0, **named)
+    )
+    task = name.removesuffix("_compact")
+    start = load_demonstrations(DATA / "demonstrations" / f"{task}.parquet").select(range(4))
+    plan = replace(PLAN, max_rules=most, turns=1, search_episodes=2, max_steps=30)
+    rules = shipped(name)
+    ticks = []
+    aggregate(start, plan, first_rules=rules, progress=lambda done, _: ticks.append(done) or True)
+    (search,) = searches
+    effort = plan.search(pruned=len(rules) - most)
+    assert search._next - REFINEMENT == effort.seeds(0)
+    assert search._done == search._total == effort.cost(0)
+    assert ticks == sorted(ticks)
+
+
+def stopped_in(part, cart, monkeypatch):
+    """Ctrl-C in a part of a refinement that is to leave a rule out."""
+
+    def interrupted(*arguments, **named):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Refinement, part, interrupted)
     plan = replace(PLAN, max_rules=2, turns=1, search_episodes=2)
-    given = {
-        "first_rules": shipped("cartpole_compact"),
-        "progress": lambda done, total: done < share * total,
-    }
-    if stays:
-        found = aggregate(cart, plan, **given)
-        assert len(found.rule_set) == 2
-        assert not found.is_finished
-    else:
-        with pytest.raises(CancelledError):
-            aggregate(cart, plan, **given)
+    return aggregate(cart, plan, first_rules=shipped("cartpole_compact"))
+
+
+def test_who_stops_has_no_more_rules_than_were_asked_for(cart, small_search, monkeypatch):
+    with pytest.raises(KeyboardInterrupt):
+        stopped_in("_with_a_rule_less", cart, monkeypatch)
+
+
+@pytest.mark.parametrize("part", ["_move_after_pruning", "_turn"])
+def test_who_stops_later_has_what_was_left(part, cart, small_search, monkeypatch):
+    found = stopped_in(part, cart, monkeypatch)
+    assert len(found.rule_set) == 2
+    assert found.refined
+    assert not found.is_finished
+
+
+def test_what_is_left_asks_something(cart):
+    (tree,) = recount(shipped("cartpole_compact"), cart)
+    assert (tree.feature == LEAF).sum() == 3
+    less = with_a_rule_less([tree], cart, max_rules=2, count=100)
+    assert {len(one.structures[0].feature) for one in less} == {3}
+
+
+def test_more_seeds_than_one_run_has_are_refused(cart):
+    plan = replace(PLAN, max_rules=2, turns=1, search_episodes=500)
+    rules = shipped("lunar_lander_compact")
+    start = load_demonstrations(DATA / "demonstrations" / "lunar_lander.parquet").select(range(4))
+    with pytest.raises(InputError, match="give a larger --max-rules, or fewer --search-episodes"):
+        aggregate(start, plan, first_rules=rules)
 
 
 def test_what_few_states_meet_is_left_out_first():

@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from threading import Barrier, Lock
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from sarl_core.agents.agent import Agent
 from sarl_core.environments.environment import Environment
 from sarl_core.errors import InputError, SarlError, WorkError
 from sarl_core.mining.algorithm_1 import mine_rules
-from sarl_core.processes import Processes, run_each
+from sarl_core.processes import Processes
 from sarl_core.rollouts.episodes import Episodes, join, rollout
 from sarl_core.rollouts.recording import record
 from sarl_core.rollouts.tasks import Task, run_tasks
@@ -207,27 +206,3 @@ def test_processes_give_way_to_those_who_serve_pages_and_not_where_a_caller_wait
 def test_nothing_to_run_is_refused(episodes: int, seed: int) -> None:
     with pytest.raises(InputError, match="at least one episode"):
         task(episodes=episodes, seed=seed)
-
-
-@pytest.mark.parametrize(("at_once", "most"), [(None, 3), (1, 1), (2, 2)])
-def test_work_that_takes_much_memory_is_done_a_few_at_once(at_once: int | None, most: int) -> None:
-    at_work, seen, lock = 0, [0], Lock()
-    together = Barrier(most)
-
-    def work(number: int) -> int:
-        nonlocal at_work
-        with lock:
-            at_work += 1
-            seen.append(at_work)
-        if number < most:
-            together.wait(60)
-        with lock:
-            at_work -= 1
-        return 2 * number
-
-    with ThreadPoolExecutor(4) as threads:
-        executor = cast(Any, threads)
-        executor.workers = 2
-        tasks = [(number,) for number in range(6)]
-        assert run_each(work, tasks, executor=executor, at_once=at_once) == [0, 2, 4, 6, 8, 10]
-    assert max(seen) == most
