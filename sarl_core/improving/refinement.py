@@ -115,11 +115,6 @@ class SearchEffort:
         return min(self.starts, usual if self.moved is None else self.moved)
 
     @property
-    def prunings(self) -> int:
-        """How often thresholds are moved while rules are left out."""
-        return -(-self.pruned // _AT_A_TIME)
-
-    @property
     def generations(self) -> int:
         """In which the best is moved, in each turn."""
         return _LATE if self.late is None else self.late
@@ -159,7 +154,7 @@ class SearchEffort:
         turn = met + changed + moved_on + 2 * compared
         begun = begun if self.starts > 1 else 0
         pruned = self.pruned * (met + ranked(_LEFT_OUT, _COMPARED))
-        pruned += self.prunings * (met + _BETWEEN * moved(_CAREFUL) + compared)
+        pruned += -(-self.pruned // _AT_A_TIME) * (met + _BETWEEN * moved(_CAREFUL) + compared)
         return _EXPERT * episodes + before + begun + pruned + turns * turn
 
     def seeds(self, turns: int) -> int:
@@ -180,7 +175,7 @@ class SearchEffort:
         turn = _MET + changed + _COMPARED + self.generations * _CAREFUL + _COMPARED
         begun = begun if self.starts > 1 else 0
         pruned = self.pruned * (_MET + _COMPARED)
-        pruned += self.prunings * (_MET + _BETWEEN * _CAREFUL + _COMPARED)
+        pruned += -(-self.pruned // _AT_A_TIME) * (_MET + _BETWEEN * _CAREFUL + _COMPARED)
         return self.episodes * (_EXPERT + before + begun + pruned + turns * turn)
 
 
@@ -237,14 +232,10 @@ class Refinement:
         self._combined, self._max_rules = combined, max_rules
         beyond = self.here.beyond(max_rules) if len(starts) == 1 else 0
         self._effort = replace(effort, starts=len(starts), pruned=beyond)
+        self.is_pruned = beyond > 0  # whether it leaves out some of those that it begins with
         self._improvement: PolicyImprovement | None = None  # that led here
         self._next, self._generator = first, np.random.default_rng(seed)
         self._workers = executor_of(jobs, executor)
-
-    @property
-    def is_pruned(self) -> bool:
-        """Whether it leaves out rules that it begins with, because they are too many."""
-        return self._effort.pruned > 0
 
     def run(
         self,
@@ -336,7 +327,8 @@ class Refinement:
         pruned = 0
         while self.here.beyond(self._max_rules):
             met = self._met()
-            tried = self._with_a_rule_less(met)
+            trees = self._counted(met)
+            tried = with_a_rule_less(trees, met.pairs, max_rules=self._max_rules, count=_LEFT_OUT)
             self.here = tried[self._ranking(tried, met.pairs, _COMPARED)[0]]
             pruned += 1
             fits = not self.here.beyond(self._max_rules)
@@ -345,11 +337,6 @@ class Refinement:
             if fits or pruned % _AT_A_TIME == 0:
                 self._move_after_pruning()
         self.start = self.here
-
-    def _with_a_rule_less(self, met: MetStates) -> list[Candidate]:
-        pairs = met.pairs.deriving(self.here.derived)
-        trees = self.here.trees(pairs, self._evaluator.divider)
-        return with_a_rule_less(trees, pairs, max_rules=self._max_rules, count=_LEFT_OUT)
 
     def _move_after_pruning(self) -> None:
         met = self._met()
@@ -464,6 +451,13 @@ class Refinement:
         pairs = pairs.deriving(list(dict.fromkeys([*here.derived, *offered])))
         return MetStates(pairs, scores(self._expert, pairs.raw_observations))
 
+    def _counted(self, met: MetStates) -> list[PolicyTree]:
+        """The trees of here, over all that may be asked about."""
+        return [
+            count_tree(structure, met.pairs, index, divider=self._evaluator.divider)
+            for index, structure in enumerate(self.here.structures)
+        ]
+
     def _some_pairs(self) -> list[Pair]:
         """Pairs of features that the next queries may combine."""
         if len(self._combined) <= _PAIRS:
@@ -473,12 +467,8 @@ class Refinement:
 
     def _shapes(self, met: MetStates) -> list[Candidate]:
         """The likeliest neighbours in shape."""
-        trees = [
-            count_tree(structure, met.pairs, index, divider=self._evaluator.divider)
-            for index, structure in enumerate(self.here.structures)
-        ]
         others = neighbours(
-            trees,
+            self._counted(met),
             met,
             max_rules=self._max_rules,
             count=_NEIGHBOURS,

@@ -128,7 +128,7 @@ def stopped_in(part, cart, monkeypatch):
 
 def test_who_stops_has_no_more_rules_than_were_asked_for(cart, small_search, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
-        stopped_in("_with_a_rule_less", cart, monkeypatch)
+        stopped_in("_prune", cart, monkeypatch)
 
 
 @pytest.mark.parametrize("part", ["_move_after_pruning", "_turn"])
