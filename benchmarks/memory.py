@@ -26,7 +26,7 @@ from sarl_core import save_demonstrations
 ROWS = 1_000_000
 DATA = ROWS * (FEATURES * 4 + 3 * 8)  # bytes: states, and an action, an episode and a step each
 REACH = 3.0
-ELSEWHERE_REACH = 5.0  # of what is made when it is asked for, and which no other page needs
+ELSEWHERE_REACH = 6.0  # of what is made when it is asked for, and which no other page needs
 THRESHOLDS = "support=0.001&confidence=0.8"  # a few rules, of an expert that is often undecided
 _PERIOD = 0.05  # seconds between two looks
 _QUIET = 10.0  # seconds without a change
