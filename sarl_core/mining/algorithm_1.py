@@ -45,6 +45,28 @@ def cut_nodes(
     return np.flatnonzero(qualifies & first)
 
 
+def is_cut(tree: PolicyTree, thresholds: Thresholds) -> NDArray[np.bool_]:
+    """Whether `cut_nodes` cuts a path at each node.
+
+    Args:
+        tree: With n nodes.
+        thresholds: At which it is cut.
+
+    Returns:
+        Shape (n,).
+    """
+    nodes = cut_nodes(
+        tree,
+        supp_min=thresholds.support,
+        conf_min=thresholds.confidence,
+        lift_min=thresholds.lift,
+        max_depth=thresholds.max_depth,
+    )
+    cut = np.zeros(tree.n_nodes, dtype=np.bool_)
+    cut[nodes] = True
+    return cut
+
+
 def mine_rules(
     demonstrations_or_trees: Demonstrations | PolicyTree | Sequence[PolicyTree],
     *,

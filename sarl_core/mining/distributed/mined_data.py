@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.errors import InputError
-from sarl_core.mining.algorithm_1 import cut_nodes
+from sarl_core.mining.algorithm_1 import is_cut
 from sarl_core.mining.editing.renaming import renamed_trees
 from sarl_core.mining.evidence import DataBox, EpisodeCounts, HeldOut
 from sarl_core.mining.never.never_rules import forbidding_nodes, mine_at
@@ -331,17 +331,7 @@ def _right_labels(
     """
     at, epsilon = thresholds, thresholds.never or 0.0
     allowed = ~forbidding_nodes(tree, epsilon=epsilon, supp_min=at.support, max_depth=at.max_depth)
-    demands = np.zeros(tree.n_nodes, dtype=np.bool_)
-    if at.demands:
-        demands[
-            cut_nodes(
-                tree,
-                supp_min=at.support,
-                conf_min=at.confidence,
-                lift_min=at.lift,
-                max_depth=at.max_depth,
-            )
-        ] = True
+    demands = is_cut(tree, at) if at.demands else np.zeros(tree.n_nodes, dtype=np.bool_)
     allowed[demands] = np.arange(allowed.shape[1]) == tree.label[demands, None]
     for depth in range(1, int(tree.depth.max()) + 1):
         nodes = np.flatnonzero(tree.depth == depth)

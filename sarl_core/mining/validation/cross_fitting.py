@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from sarl_core.demonstrations.dataset import Demonstrations
 from sarl_core.demonstrations.samples import require_every_step
 from sarl_core.errors import InputError
-from sarl_core.mining.algorithm_1 import cut_nodes
+from sarl_core.mining.algorithm_1 import is_cut
 from sarl_core.mining.combining.candidates import Pair
 from sarl_core.mining.combining.choice import chosen_again
 from sarl_core.mining.evidence import EpisodeCounts, HeldOut, held_out_of
@@ -233,17 +233,7 @@ def judged_at(
     """
     samples, correct = np.zeros((2, len(numbers)), dtype=np.int64)
     for tree, counted in zip(trees, together, strict=True):
-        chosen = np.zeros(tree.n_nodes, dtype=np.bool_)
-        chosen[
-            cut_nodes(
-                tree,
-                supp_min=thresholds.support,
-                conf_min=thresholds.confidence,
-                lift_min=thresholds.lift,
-                max_depth=thresholds.max_depth,
-            )
-        ] = True
-        some, right = counted(chosen)
+        some, right = counted(is_cut(tree, thresholds))
         samples, correct = samples + some, correct + right
     return Judged(numbers, lengths, lengths * len(trees), samples, correct)
 
